@@ -1,0 +1,66 @@
+"""How kernels are compiled: one place for the numba flags and for the on-disk cache.
+
+Two decorators:
+
+``inner``   a helper that other kernels call; never cached by itself.
+``kernel``  an entry point that Python calls; compiled once per machine and kept on disk.
+
+numba stamps a cached kernel with its own file only, so an edited helper in another module would keep serving the stale
+binary.  The cache directory is therefore named after a hash of every source file of the package that compiles code.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: FMA contraction only: NaN still behaves, and results are the same on every CPU that has FMA.
+_FLAGS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
+
+
+def inner(function: F) -> F:
+    """Compile a helper that is called from kernels."""
+    return numba.njit(**_FLAGS)(function)  # type: ignore[no-any-return]
+
+
+def kernel(function: F) -> F:
+    """Compile an entry point, cached on disk under a directory keyed on all kernel sources."""
+    previous = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+    numba.config.CACHE_DIR = str(cache_directory())  # type: ignore[attr-defined]
+    try:
+        return numba.njit(cache=True, **_FLAGS)(function)  # type: ignore[no-any-return]
+    finally:
+        numba.config.CACHE_DIR = previous  # type: ignore[attr-defined]
+
+
+@functools.cache
+def cache_directory() -> Path:
+    """Directory of the compiled kernels: ``$USV_GYM_CACHE`` or the user's cache, plus the hash of the kernel sources."""
+    root = os.environ.get("USV_GYM_CACHE") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(root) / "usv_gym" / f"kernels-{_source_hash()}"
+
+
+def _source_hash() -> str:
+    package = Path(__file__).parent
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_bytes()
+        if b"jit import" in text or path.name in ("jit.py", "state.py"):
+            digest.update(path.relative_to(package).as_posix().encode())
+            digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+def is_warm() -> bool:
+    """True when compiled kernels of exactly these sources are on disk already."""
+    directory = cache_directory()
+    return directory.is_dir() and any(directory.rglob("*.nbc"))

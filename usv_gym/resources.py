@@ -1,0 +1,19 @@
+"""Files that ship with the package: ``configs/`` stands at the top of the repository and inside the wheel."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+
+@functools.cache
+def configs() -> Path:
+    """Directory with vessels/, sensors/, tasks/, scenarios/ and suites/."""
+    package = Path(__file__).parent
+    inside = package / "configs"
+    return inside if inside.is_dir() else package.parent / "configs"
+
+
+def shipped(kind: str) -> dict[str, Path]:
+    """Name -> path of what ships in ``configs/<kind>``, sorted by name."""
+    return {path.stem: path for path in sorted((configs() / kind).glob("*.yaml"))}

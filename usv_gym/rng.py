@@ -1,0 +1,64 @@
+"""Noise inside a step: a counter, not a generator.
+
+Every random number is a pure function of (world seed, stream, slot, tick).  Nothing is carried along, so a sensor that
+does not fire draws nothing, a controller that acts differently moves nobody's noise, and row i of any batch equals the
+same world alone.  The mixing function is the finaliser of SplitMix64 (Steele, Lea and Flood 2014), applied per word.
+
+``numpy.random.Generator`` is used at reset only, to draw ``seed`` and the scenario.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .jit import inner
+from .trig import sincos
+
+# Streams: one per use, never reused.  Each world draws stream x slot x tick.
+WIND, CURRENT, WAVE = 1, 2, 3
+GNSS, IMU, SPEED_LOG, WIND_SENSOR, MRU, HEADING = 10, 11, 12, 13, 14, 15
+AIS_BIAS, AIS_NOISE, AIS_LOSS, AIS_PHASE, AIS_LATENCY = 20, 21, 22, 23, 24
+RADAR_BIAS, RADAR_NOISE, RADAR_DETECTION = 30, 31, 32
+LIDAR_BIAS, LIDAR_NOISE, LIDAR_DETECTION = 40, 41, 42
+BEHAVIOUR = 50
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_M1 = np.uint64(0xBF58476D1CE4E5B9)
+_M2 = np.uint64(0x94D049BB133111EB)
+_S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+_SLOT_BITS, _STREAM_BITS = np.uint64(32), np.uint64(52)
+_TO_UNIT = 1.0 / 9007199254740992.0  # 2^-53
+
+
+@inner
+def _mix(z):
+    z = (z ^ (z >> _S30)) * _M1
+    z = (z ^ (z >> _S27)) * _M2
+    return z ^ (z >> _S31)
+
+
+@inner
+def bits(seed, stream, slot, tick):
+    """64 random bits of a counter; slot < 2^20, tick < 2^32."""
+    word = (np.uint64(stream) << _STREAM_BITS) | (np.uint64(slot) << _SLOT_BITS) | np.uint64(tick)
+    return _mix(_mix(np.uint64(seed) + _GOLDEN) ^ (word * _GOLDEN))
+
+
+@inner
+def uniform(seed, stream, slot, tick):
+    """One number in [0, 1)."""
+    return np.float64(bits(seed, stream, slot, tick) >> _S11) * _TO_UNIT
+
+
+@inner
+def normal2(seed, stream, slot, tick):
+    """Two independent standard normal numbers (Box and Muller 1958)."""
+    first = bits(seed, stream, slot, tick)
+    second = _mix(first + _GOLDEN)
+    u = (np.float64(first >> _S11) + 0.5) * _TO_UNIT
+    v = np.float64(second >> _S11) * _TO_UNIT
+    radius = math.sqrt(-2.0 * math.log(u))
+    s, c = sincos(2.0 * math.pi * v)
+    return radius * c, radius * s

@@ -1,0 +1,310 @@
+"""The floor plan of the house: one structured record holds one world.
+
+``world_dtype(V, M, O, P)`` gives the dtype of B worlds; ``np.zeros(B, world_dtype(...))`` is the batch.  NumPy code reads
+``worlds["vessels"]["eta"]`` as a ``[B, V, 3]`` view; kernels take ``worlds[b]`` and read ``w.vessels.eta[j, 0]`` at offsets
+known at compile time.
+
+Sizes: B worlds, V vessel slots (slot 0 is the own ship by convention), M obstacle slots, S = V + M sources (a source is
+anything a sensor can see: vessel j is source j, obstacle m is source V + m), O observers, P plants (3-DOF vessels),
+A thrusters per plant, W waypoints per route.
+
+Units and frames: SI and radians; {n} is the local tangent plane (north, east) at ``origin``; {b} is the body frame
+(forward, starboard).  Times are integers: ticks of ``dt_us``, or microseconds where the name ends in ``_us``.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+Dtype = np.dtype[Any]
+
+A = 4  #: thrusters per plant
+W = 32  #: waypoints per route
+
+# --- codes -----------------------------------------------------------------------------------------------------------
+KIND_SHIP, KIND_VESSEL, KIND_BOAT, KIND_USV = 0, 1, 2, 3
+KIND_ICEBERG, KIND_BUOY, KIND_ISLET, KIND_LIGHTHOUSE, KIND_PLATFORM = 10, 11, 12, 13, 14
+MODEL_KINEMATIC, MODEL_3DOF = 0, 1
+BEHAVIOUR_HOLD, BEHAVIOUR_WAYPOINTS = 0, 1
+AFTER_STOP, AFTER_CONTINUE, AFTER_LOOP = 0, 1, 2
+AIS_NONE, AIS_CLASS_A, AIS_CLASS_B, AIS_ATON = 0, 1, 2, 3
+AIS, RADAR, LIDAR = 0, 1, 2  #: sensors of the TDM, in the order of every ``[.., 3]`` axis
+PHASE_NONE, PHASE_POSITION, PHASE_MOTION = 0, 1, 2  #: what a local filter knows
+DESCRIPTOR_FIXED, DESCRIPTOR_VESSEL, DESCRIPTOR_LAND = 0, 1, 2
+
+NX_AIS, NX_SCAN = 12, 9  #: states of the AIS filter and of a radar or LiDAR filter (sensors/tracker.py)
+NP_AIS, NP_SCAN = NX_AIS * (NX_AIS + 1) // 2, NX_SCAN * (NX_SCAN + 1) // 2  #: packed covariances
+
+f8, f4, i8, i4, i2, i1, u8 = np.float64, np.float32, np.int64, np.int32, np.int16, np.int8, np.uint64
+
+
+def _weather() -> Dtype:
+    ou = [("std", f8), ("time_constant", f8), ("limit", f8), ("decay", f8), ("x", f8)]  # Ornstein-Uhlenbeck process
+    return np.dtype([
+        ("on", i1),  # 0: no wind, current or wave code runs at all (air drag included)
+        ("original", i1),  # preset `original`: per-step noise and Euler steps as in 2017
+        # wind
+        ("wind_speed", f8), ("wind_to", f8),  # mean at 10 m [m/s], blowing towards [rad]
+        ("wind_height_factor", f8),  # wind at sensor height / wind at 10 m
+        ("wind_slow", ou), ("wind_gust", ou), ("wind_turn", ou),  # [m/s], [m/s], [rad]
+        ("wind_u10", f8), ("wind_direction", f8),  # realised at 10 m [m/s], towards [rad]
+        # current
+        ("current_speed", f8), ("current_to", f8),  # mean [m/s], towards [rad]
+        ("current_slow", ou), ("current_turn", ou),  # [m/s], [rad]
+        ("current", f8, (2,)),  # realised velocity of the water [N, E] {n} [m/s]
+        # waves
+        ("wave_height", f8), ("wave_to", f8),  # significant height [m], travelling towards [rad]
+        ("wave_omega0", f8), ("wave_damping", f8),  # modal frequency [rad/s], relative damping
+        # what weather does to sensors, as factors of range and of missed detections (1 = clear)
+        ("radar_range_factor", f8), ("lidar_range_factor", f8), ("detection_factor", f8),
+    ], align=True)  # fmt: skip
+
+
+def _plants(P: int) -> Dtype:
+    """3-DOF vessels: parameters (data, from configs/vessels) and inner state.  SAE/SNAME signs, {b}."""
+    return np.dtype([
+        # rigid body and added mass, M = [[m11, 0, 0], [0, m22, m23], [0, m32, m33]]
+        ("m11", f8, (P,)), ("m22", f8, (P,)), ("m23", f8, (P,)), ("m32", f8, (P,)), ("m33", f8, (P,)),
+        ("coriolis_full", i1, (P,)),  # 1: C(nu) from M (Fossen 2021, eq. 3.63 and 6.54); 0: only c26 * u * r in sway
+        ("c26", f8, (P,)),  # linearised Coriolis coefficient of sway [kg]
+        ("mrb", f8, (P, 3)),  # rigid body m, m*x_g, I_z, for the full Coriolis matrix
+        ("ma", f8, (P, 4)),  # added mass -Xudot, -Yvdot, -Yrdot, -Nrdot
+        # damping derivatives as in the literature: force = derivative * motion, hence negative numbers for drag
+        ("Xu", f8, (P,)), ("Xuu", f8, (P,)), ("Xuuu", f8, (P,)),
+        ("Xuu_ittc", f8, (P,)),  # times (0.075 / (log10 Re - 2)^2 + 0.014) |u| u
+        ("Yv", f8, (P,)), ("Yr", f8, (P,)), ("Yvv", f8, (P,)), ("Yrv", f8, (P,)), ("Yvr", f8, (P,)), ("Yrr", f8, (P,)),
+        ("Yvvv", f8, (P,)),
+        ("Nv", f8, (P,)), ("Nr", f8, (P,)), ("Nvv", f8, (P,)), ("Nrv", f8, (P,)), ("Nvr", f8, (P,)), ("Nrr", f8, (P,)),
+        ("Nrrr", f8, (P,)), ("Nur", f8, (P,)),
+        # cross-flow drag over the strips x0..x1 of draught T
+        ("cd2d", f8, (P,)), ("draught", f8, (P,)), ("strip_x0", f8, (P,)), ("strip_x1", f8, (P,)),
+        ("crossflow_sway", f8, (P,)), ("crossflow_yaw", f8, (P,)), ("crossflow_dead_zone", f8, (P,)),  # [-], [-], [m/s]
+        ("length_pp", f8, (P,)),
+        # wind areas (Blendermann form)
+        ("area_front", f8, (P,)), ("area_side", f8, (P,)), ("wind_arm", f8, (P,)), ("cd_t", f8, (P,)),
+        ("cd_l_bow", f8, (P,)), ("cd_l_stern", f8, (P,)), ("wind_delta", f8, (P,)),
+        ("wind_surge_factor", f8, (P,)),  # A_F / A_L in the standard form; 1 in the preset `original`
+        ("wave_gain", f8, (P, 3)),  # X [N], Y [N], N [N m] per metre of wave height (noise at 0.05 s, see disturbance.py)
+        ("memory", i1, (P,)), ("memory_scale", f8, (P, 2)),  # fluid memory of sway and yaw: on, scale of force and moment
+        ("yaw_gain", f8, (P,)),  # 1; preset `original` integrates heading 2.5 % fast
+        # thrusters; state first-order lags. force = gain * n|n| * bucket, along direction + nozzle angle
+        ("thrusters", i2, (P,)),  # how many of A are fitted
+        ("x", f8, (P, A)), ("y", f8, (P, A)), ("direction", f8, (P, A)),  # [m], [m] {b}; [rad], 0 ahead, pi/2 starboard
+        ("gain_ahead", f8, (P, A)), ("gain_astern", f8, (P, A)),  # [N/rpm^2]
+        ("n_idle", f8, (P, A)), ("n_max", f8, (P, A)), ("n_min", f8, (P, A)),  # [rpm]; n_min is reverse at -100 %
+        ("n_lag", f8, (P, A)),  # [s]
+        ("nozzle_max", f8, (P, A)), ("nozzle_lag", f8, (P, A)),  # [rad] (0: fixed), [s]; +100 % turns to starboard
+        ("bucket", i1, (P, A)), ("bucket_lag", f8, (P, A)), ("bucket_in_yaw", i1, (P,)),  # fitted, [s], quirk 7 off/on
+        ("euler_actuators", i1, (P,)),  # preset `original`: one 0.05 s Euler step per command row
+        # mixing of (surge, yaw) demands in [-1, 1] into commands, for autopilots and two-channel actions
+        ("mix_surge", f8, (P, A)), ("mix_yaw", f8, (P, A)), ("mix_nozzle", f8, (P, A)),
+        ("reverse_by_bucket", i1, (P,)),
+        # faults, written by scenario events: share of thrust that is left, nozzle held where it is
+        ("thrust_left", f8, (P, A)), ("nozzle_stuck", i1, (P, A)),
+        # autopilot gains
+        ("ap_heading", f8, (P, 3)), ("ap_speed", f8, (P, 3)), ("ap_speed_max", f8, (P,)), ("ap_rate_max", f8, (P,)),
+        ("ap_integral", f8, (P, 2)),  # state: heading, speed
+        # state
+        ("command", f8, (P, A, 3)),  # demanded rpm, nozzle, bucket, each in [-1, 1]
+        ("n", f8, (P, A)), ("alpha", f8, (P, A)), ("beta", f8, (P, A)),  # rpm, nozzle [rad], bucket [-1, 1]
+        ("tau", f8, (P, 3)), ("tau_wind", f8, (P, 3)), ("tau_wave", f8, (P, 3)),  # [N, N, N m] {b}
+        ("memory_x", f8, (P, 12)),  # fluid-memory states
+        ("wave_x", f8, (P, 3, 2)),  # wave-force states per degree of freedom, unit variance
+        ("wind_relative", f8, (P, 2)),  # at sensor height: speed [m/s], angle it comes from, off the bow [rad], starboard +
+    ], align=True)  # fmt: skip
+
+
+def _vessels(V: int) -> Dtype:
+    return np.dtype([
+        ("active", i1, (V,)), ("controlled", i1, (V,)), ("kind", i1, (V,)), ("model", i1, (V,)), ("behaviour", i1, (V,)),
+        ("plant", i2, (V,)),  # index into plants, -1 for kinematic ships
+        ("eta", f8, (V, 3)),  # N, E [m], psi [rad] {n}; psi is not wrapped
+        ("nu", f8, (V, 3)),  # u, v [m/s], r [rad/s] {b}, over ground
+        ("velocity", f8, (V, 2)),  # N, E {n} [m/s], over ground
+        ("frame_eta", f8, (V, 3)),  # eta at the start of the traffic frame
+        ("length", f8, (V,)), ("beam", f8, (V,)),  # [m]
+        ("speed", f8, (V,)),  # set speed of kinematic ships [m/s]
+        ("heading_set", f8, (V,)),  # commanded heading of controlled kinematic ships [rad]
+        ("turn_time", f8, (V,)), ("turn_rate_max", f8, (V,)), ("turn_decay", f8, (V,)),  # [s], [rad/s], 1 - exp(-frame/T)
+        ("turn_constant", i1, (V,)),  # 1: turn at turn_rate_max with a dead band of 2 deg (the original)
+        ("distance", f8, (V,)),  # sailed [m]
+        ("mmsi", i8, (V,)), ("ais_class", i1, (V,)), ("ais_on", i1, (V,)),
+    ], align=True)  # fmt: skip
+
+
+def _routes(V: int) -> Dtype:
+    return np.dtype([
+        ("waypoint", f8, (V, W, 2)),  # N, E [m] {n}
+        ("count", i2, (V,)), ("leg", i2, (V,)),  # number of waypoints; index of the one being approached
+        ("radius", f8, (V,)),  # circle of acceptance [m]
+        ("after_last", i1, (V,)), ("done", i1, (V,)),
+        ("reached", i4, (V,)),  # how many waypoints were reached so far (a notice each)
+    ], align=True)  # fmt: skip
+
+
+def _obstacles(M: int) -> Dtype:
+    return np.dtype([
+        ("active", i1, (M,)), ("kind", i1, (M,)),
+        ("position", f8, (M, 2)),  # N, E [m] {n}
+        ("frame_position", f8, (M, 2)),  # at the start of the traffic frame
+        ("velocity", f8, (M, 2)),  # own drift [m/s] {n}
+        ("drifts", i1, (M,)),  # 1: also carried by the current
+        ("radius", f8, (M,)),  # [m]
+        ("mmsi", i8, (M,)), ("ais_class", i1, (M,)), ("ais_on", i1, (M,)),
+    ], align=True)  # fmt: skip
+
+
+def _safety(O: int, S: int) -> Dtype:
+    """Truth about distances between each observer's hull and every source, kept by the collision sweep."""
+    return np.dtype([
+        ("distance", f8, (O, S)),  # hull to hull at the end of the last frame [m]
+        ("closest", f8, (O, S)),  # smallest since reset [m]
+        ("step_closest", f8, (O,)),  # smallest to anything within the last control step [m]
+        ("collided_with", i4, (O,)),  # source index, -1 for none
+    ], align=True)  # fmt: skip
+
+
+def _sensors() -> Dtype:
+    """Sensor parameters of a world, shared by its observers.  Periods in microseconds; 0 switches a sensor off."""
+    scan = np.dtype([
+        ("on", i1), ("period_us", i8), ("latency_us", i8),
+        ("range", f8), ("range_min", f8),  # [m]
+        ("gain", f8), ("gain_floor", f8),  # f(d) = max(gain * d, gain_floor), thesis (2.5)
+        ("noise", f8, (2,)),  # standard deviation of the white part at f(d) = 1: position per axis [m], radius [m]
+        ("bias", f8, (2,)), ("bias_time", f8, (2,)),  # stationary standard deviation [m], time constant [s]
+        ("detection", f8), ("detection_radius", f8),  # P_d of a large object; apparent radius [m] at which P_d is halved
+        ("timeout_us", i8),
+        ("outage", i1),  # fault: gives nothing
+    ], align=True)  # fmt: skip
+    return np.dtype([
+        ("exteroceptive", i1),  # 0: AIS, radar, LiDAR and TDM are not simulated (observation `truth` needs none)
+        # AIS, as transmitted: E and N [m], COG [rad], true heading ("track") [rad], SOG [m/s], ROT [rad/s]
+        ("ais_on", i1), ("ais_range", f8), ("ais_loss", f8), ("ais_latency_us", i8),
+        ("ais_interval_us", i8),  # fixed interval; 0: the schedule of ITU-R M.1371
+        ("ais_noise", f8, (6,)), ("ais_bias", f8, (6,)), ("ais_bias_time", f8, (6,)),
+        ("ais_quantised", i1),  # what is received has the resolution of the wire
+        ("ais_jammed", i1),
+        ("radar", scan), ("lidar", scan),
+        ("radius_min", f8),  # smallest measured radius [m]
+        # TDM
+        ("tdm_period_us", i8),
+        ("process_u", f8), ("process_r", f8), ("process_time", f8),  # PSD [(m/s2)^2/s], [(rad/s2)^2/s]; T [s] of b1, b2
+        ("inflation", f8),  # Carlson's federated inflation of Q and P0; 1 in the thesis
+        # own navigation: period [us], white noise per field
+        ("gnss_period_us", i8), ("gnss_noise", f8, (4,)),  # position [m], heading [rad], course [rad], speed [m/s]
+        ("gnss_frozen", i1), ("gnss_drift", f8, (2,)),  # faults: holds its last fix; offset [m] {n}
+        ("mru_period_us", i8), ("mru_noise", f8, (2,)),  # heading [rad], yaw rate [rad/s]; roll, pitch, heave are 0 in 3 DOF
+        ("imu_period_us", i8), ("imu_noise", f8, (2,)),  # specific force [m/s2], yaw rate [rad/s]
+        ("log_period_us", i8), ("log_noise", f8),  # speed log: u, v [m/s]
+        ("wind_period_us", i8), ("wind_noise", f8, (2,)),  # speed [m/s], angle [rad]
+    ], align=True)  # fmt: skip
+
+
+def _ais(O: int, S: int) -> Dtype:
+    """What ships transmit and what observers receive.  ``report`` is the last message of each source, as on the wire."""
+    return np.dtype([
+        ("next_tick", i8, (S,)),  # of transmission
+        ("last_tick", i8, (S,)),  # of the bias process
+        ("bias", f8, (S, 6)),  # N, E [m], COG, heading [rad], SOG [m/s], ROT [rad/s]
+        ("sequence", i4, (S,)),  # messages sent so far
+        ("stamp_us", i8, (S,)),
+        ("position", f8, (S, 2)),  # reported N, E [m] {n}
+        ("cog", f8, (S,)), ("heading", f8, (S,)),  # [rad]
+        ("sog", f8, (S,)), ("rot", f8, (S,)),  # [m/s], [rad/s]; NaN where the message type has none
+        ("received", i4, (O, S)),  # sequence number of the last message that got through
+        ("due_tick", i8, (O, S)),  # when that message arrives; -1: nothing on its way
+    ], align=True)  # fmt: skip
+
+
+def _nav(O: int) -> Dtype:
+    """Own navigation of each observer, as measured.  ``next`` are ticks."""
+    return np.dtype([
+        ("gnss_next", i8, (O,)), ("mru_next", i8, (O,)), ("imu_next", i8, (O,)), ("log_next", i8, (O,)), ("wind_next", i8, (O,)),
+        ("gnss_stamp_us", i8, (O,)),
+        ("position", f8, (O, 2)), ("heading", f8, (O,)), ("course", f8, (O,)), ("sog", f8, (O,)),
+        ("mru_heading", f8, (O,)), ("yaw_rate", f8, (O,)),
+        ("specific_force", f8, (O, 2)), ("imu_yaw_rate", f8, (O,)), ("imu_nu", f8, (O, 3)),  # last nu and its tick: internal
+        ("imu_tick", i8, (O,)),
+        ("water_speed", f8, (O, 2)),  # u, v over ground by the speed log [m/s]
+        ("wind_speed", f8, (O,)), ("wind_angle", f8, (O,)),
+        ("leg", i2, (O,)),  # own idea of the active waypoint, from measured position
+        ("route_done", i1, (O,)),
+    ], align=True)  # fmt: skip
+
+
+def _tracks(O: int, S: int) -> Dtype:
+    """Local filters of each observer and source.  Axis of 2: radar, LiDAR.  Layouts in sensors/tracker.py."""
+    return np.dtype([
+        ("stamp_us", i8, (O, S, 3)),  # time of validity of each local filter
+        ("phase", i1, (O, S, 3)),
+        ("id", i4, (O, S)),  # stable target id, 0: no target
+        ("x_ais", f8, (O, S, NX_AIS)), ("p_ais", f8, (O, S, NP_AIS)),
+        ("x_scan", f8, (O, 2, S, NX_SCAN)), ("p_scan", f8, (O, 2, S, NP_SCAN)),
+        ("size", f8, (O, 2, S, 2)), ("p_size", f8, (O, 2, S, 3)),  # apparent radius and its bias
+        ("start", f8, (O, 2, S, 10)),  # two-point initialisation: first fix and running line fit
+        ("scan_bias", f8, (O, 2, S, 3)),  # truth of the sensor error: bias of N, E, radius (unit f(d))
+        ("scan_bias_us", i8, (O, 2, S)),
+        ("measured", f8, (O, 2, S, 4)),  # last raw measurement: N, E, radius, f(d)
+        ("measured_us", i8, (O, 2, S)),
+        ("visible", i1, (O, 2, S)),  # whether the last scan of that sensor could see the source (truth of the sensor)
+    ], align=True)  # fmt: skip
+
+
+def _picture(O: int, S: int) -> Dtype:
+    """Detected targets as the TDM reports them: the only thing a controller gets to see of the surroundings."""
+    return np.dtype([
+        ("tick", i8, (O,)), ("sequence", i4, (O,)), ("next_id", i4, (O,)),
+        ("count", i4, (O,)),  # how many are valid
+        ("id", i4, (O, S)),  # 0: empty
+        ("descriptor", i1, (O, S)), ("sensors", i1, (O, S)),  # bit 0 AIS, 1 radar, 2 LiDAR
+        ("motion_known", i1, (O, S)),
+        ("position", f8, (O, S, 2)),  # N, E [m] {n}
+        ("cog", f8, (O, S)), ("sog", f8, (O, S)), ("rot", f8, (O, S)),  # [rad], [m/s], [rad/s]; NaN while unknown
+        ("radius", f8, (O, S)),  # apparent radius [m]; NaN while only AIS has seen it
+        ("covariance", f8, (O, S, 5)),  # of N, NE, E [m2], variance of cog [rad2] and sog [m2/s2]
+        ("radius_variance", f8, (O, S)),
+    ], align=True)  # fmt: skip
+
+
+@functools.cache
+def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
+    """dtype of a world with V vessel slots, M obstacle slots, O observers and P plants (see the module's docstring)."""
+    S = V + M
+    return np.dtype([
+        ("tick", i8), ("dt_us", i8), ("dt", f8),
+        ("frame_ticks", i8), ("frame_tick", i8),  # ticks per traffic frame; tick at which the current frame began
+        ("traffic_tick", i8),  # tick to which positions of traffic refer
+        ("next_sense", i8), ("next_nav", i8),  # first tick at which any exteroceptive sensor, any navigation sensor fires
+        ("seed", u8),
+        ("origin", f8, (2,)), ("metres_per_degree", f8, (2,)),  # latitude, longitude [deg]; [m/deg]
+        ("epoch_us", i8),  # UTC of tick 0
+        ("area", f8, (2,)),  # centre-free bound: out of area when |N - N0| or |E - E0| exceeds it; [0] half size, 0: none
+        ("weather", _weather()),
+        ("vessels", _vessels(V)), ("plants", _plants(P)), ("routes", _routes(V)), ("obstacles", _obstacles(M)),
+        ("safety", _safety(O, S)),
+        ("sensors", _sensors()), ("observer", i2, (O,)),  # vessel slot of each observer
+        ("ais", _ais(O, S)), ("nav", _nav(O)), ("tracks", _tracks(O, S)), ("picture", _picture(O, S)),
+        ("scratch", f8, (4, 2 * S + 2)), ("order", i4, (2 * S + 2,)), ("hidden", i1, (S,)),  # work space of the shadow test
+    ], align=True)  # fmt: skip
+
+
+#: (vessels, obstacles): compile cost is per class, so there are few
+CAPACITIES = ((8, 16), (20, 40), (64, 128), (257, 256))
+
+
+def capacity(vessels: int, obstacles: int) -> tuple[int, int]:
+    """Smallest capacity class that holds a world.
+
+    Raises
+    ------
+    ValueError
+        if there are more objects than the largest class holds.
+    """
+    for V, M in CAPACITIES:
+        if vessels <= V and obstacles <= M:
+            return V, M
+    V, M = CAPACITIES[-1]
+    raise ValueError(f"{vessels} vessels and {obstacles} obstacles: at most {V} and {M} fit into one world")
