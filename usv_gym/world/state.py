@@ -42,9 +42,11 @@ f8, f4, i8, i4, i2, i1, u8 = np.float64, np.float32, np.int64, np.int32, np.int1
 
 
 def _weather() -> Dtype:
-    ou = [("std", f8), ("time_constant", f8), ("limit", f8), ("decay", f8), ("x", f8)]  # Ornstein-Uhlenbeck process
+    # Ornstein-Uhlenbeck process: x <- decay x + kick noise, each tick; decay and kick follow from the rest at reset.
+    # `std` is that of x (in the preset `original`: of the noise of one step); what comes out is x, limited
+    ou = [("std", f8), ("time_constant", f8), ("limit", f8), ("decay", f8), ("kick", f8), ("x", f8)]
     return np.dtype([
-        ("on", i1),  # 0: no wind, current or wave code runs at all (air drag included)
+        ("on", i1),  # 0: flat calm, no weather code runs (the air drag of a vessel's own motion stays)
         ("original", i1),  # preset `original`: per-step noise and Euler steps as in 2017
         # wind
         ("wind_speed", f8), ("wind_to", f8),  # mean at 10 m [m/s], blowing towards [rad]
@@ -68,17 +70,15 @@ def _plants(P: int) -> Dtype:
     return np.dtype([
         # rigid body and added mass, M = [[m11, 0, 0], [0, m22, m23], [0, m32, m33]]
         ("m11", f8, (P,)), ("m22", f8, (P,)), ("m23", f8, (P,)), ("m32", f8, (P,)), ("m33", f8, (P,)),
-        ("coriolis_full", i1, (P,)),  # 1: C(nu) from M (Fossen 2021, eq. 3.63 and 6.54); 0: only c26 * u * r in sway
+        ("coriolis_full", i1, (P,)),  # 1: C(nu) from M (Fossen 2021, theorem 3.2); 0: only c26 * u * r in sway
         ("c26", f8, (P,)),  # linearised Coriolis coefficient of sway [kg]
-        ("mrb", f8, (P, 3)),  # rigid body m, m*x_g, I_z, for the full Coriolis matrix
-        ("ma", f8, (P, 4)),  # added mass -Xudot, -Yvdot, -Yrdot, -Nrdot
         # damping derivatives as in the literature: force = derivative * motion, hence negative numbers for drag
         ("Xu", f8, (P,)), ("Xuu", f8, (P,)), ("Xuuu", f8, (P,)),
         ("Xuu_ittc", f8, (P,)),  # times (0.075 / (log10 Re - 2)^2 + 0.014) |u| u
         ("Yv", f8, (P,)), ("Yr", f8, (P,)), ("Yvv", f8, (P,)), ("Yrv", f8, (P,)), ("Yvr", f8, (P,)), ("Yrr", f8, (P,)),
         ("Yvvv", f8, (P,)),
         ("Nv", f8, (P,)), ("Nr", f8, (P,)), ("Nvv", f8, (P,)), ("Nrv", f8, (P,)), ("Nvr", f8, (P,)), ("Nrr", f8, (P,)),
-        ("Nrrr", f8, (P,)), ("Nur", f8, (P,)),
+        ("Nrrr", f8, (P,)),
         # cross-flow drag over the strips x0..x1 of draught T
         ("cd2d", f8, (P,)), ("draught", f8, (P,)), ("strip_x0", f8, (P,)), ("strip_x1", f8, (P,)),
         ("crossflow_sway", f8, (P,)), ("crossflow_yaw", f8, (P,)), ("crossflow_dead_zone", f8, (P,)),  # [-], [-], [m/s]
@@ -87,8 +87,11 @@ def _plants(P: int) -> Dtype:
         ("area_front", f8, (P,)), ("area_side", f8, (P,)), ("wind_arm", f8, (P,)), ("cd_t", f8, (P,)),
         ("cd_l_bow", f8, (P,)), ("cd_l_stern", f8, (P,)), ("wind_delta", f8, (P,)),
         ("wind_surge_factor", f8, (P,)),  # A_F / A_L in the standard form; 1 in the preset `original`
+        ("current_turns", i1, (P,)),  # 1: the current keeps its direction in {n} while the vessel turns; 0: `original`
         ("wave_gain", f8, (P, 3)),  # X [N], Y [N], N [N m] per metre of wave height (noise at 0.05 s, see disturbance.py)
-        ("memory", i1, (P,)), ("memory_scale", f8, (P, 2)),  # fluid memory of sway and yaw: on, scale of force and moment
+        # fluid memory: on, scale of force and moment, denominators (without the leading 1) and numerators of the pairs
+        # sway-sway, yaw-yaw and sway-yaw (order 2)
+        ("memory", i1, (P,)), ("memory_scale", f8, (P, 2)), ("memory_den", f8, (P, 3, 4)), ("memory_num", f8, (P, 3, 4)),
         ("yaw_gain", f8, (P,)),  # 1; preset `original` integrates heading 2.5 % fast
         # thrusters; state first-order lags. force = gain * n|n| * bucket, along direction + nozzle angle
         ("thrusters", i2, (P,)),  # how many of A are fitted
@@ -99,19 +102,21 @@ def _plants(P: int) -> Dtype:
         ("nozzle_max", f8, (P, A)), ("nozzle_lag", f8, (P, A)),  # [rad] (0: fixed), [s]; +100 % turns to starboard
         ("bucket", i1, (P, A)), ("bucket_lag", f8, (P, A)), ("bucket_in_yaw", i1, (P,)),  # fitted, [s], quirk 7 off/on
         ("euler_actuators", i1, (P,)),  # preset `original`: one 0.05 s Euler step per command row
+        ("lag_step", f8, (P,)), ("lag", f8, (P, A, 3)),  # step [s] that these shares of the way (n, alpha, beta) are for
         # mixing of (surge, yaw) demands in [-1, 1] into commands, for autopilots and two-channel actions
         ("mix_surge", f8, (P, A)), ("mix_yaw", f8, (P, A)), ("mix_nozzle", f8, (P, A)),
         ("reverse_by_bucket", i1, (P,)),
         # faults, written by scenario events: share of thrust that is left, nozzle held where it is
         ("thrust_left", f8, (P, A)), ("nozzle_stuck", i1, (P, A)),
-        # autopilot gains
+        # autopilot: heading error to yaw rate [1/s], rate error to demand [s/rad], its integral [1/rad]; speed error to
+        # demand [s/m], its integral [1/m], exponent of the steady speed curve; speed at full demand, largest yaw rate
         ("ap_heading", f8, (P, 3)), ("ap_speed", f8, (P, 3)), ("ap_speed_max", f8, (P,)), ("ap_rate_max", f8, (P,)),
         ("ap_integral", f8, (P, 2)),  # state: heading, speed
         # state
         ("command", f8, (P, A, 3)),  # demanded rpm, nozzle, bucket, each in [-1, 1]
         ("n", f8, (P, A)), ("alpha", f8, (P, A)), ("beta", f8, (P, A)),  # rpm, nozzle [rad], bucket [-1, 1]
         ("tau", f8, (P, 3)), ("tau_wind", f8, (P, 3)), ("tau_wave", f8, (P, 3)),  # [N, N, N m] {b}
-        ("memory_x", f8, (P, 12)),  # fluid-memory states
+        ("memory_x", f8, (P, 4, 4)),  # fluid-memory states: sway-sway, yaw-yaw, yaw to sway, sway to yaw
         ("wave_x", f8, (P, 3, 2)),  # wave-force states per degree of freedom, unit variance
         ("wind_relative", f8, (P, 2)),  # at sensor height: speed [m/s], angle it comes from, off the bow [rad], starboard +
     ], align=True)  # fmt: skip
@@ -216,6 +221,8 @@ def _ais(O: int, S: int) -> Dtype:
         ("sog", f8, (S,)), ("rot", f8, (S,)),  # [m/s], [rad/s]; NaN where the message type has none
         ("received", i4, (O, S)),  # sequence number of the last message that got through
         ("due_tick", i8, (O, S)),  # when that message arrives; -1: nothing on its way
+        # the last message that arrived: N, E [m], COG, heading [rad], SOG [m/s], ROT [rad/s]; stamp -1: none yet
+        ("inbox", f8, (O, S, 6)), ("inbox_stamp_us", i8, (O, S)),
     ], align=True)  # fmt: skip
 
 
@@ -287,7 +294,9 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("safety", _safety(O, S)),
         ("sensors", _sensors()), ("observer", i2, (O,)),  # vessel slot of each observer
         ("ais", _ais(O, S)), ("nav", _nav(O)), ("tracks", _tracks(O, S)), ("picture", _picture(O, S)),
-        ("scratch", f8, (4, 2 * S + 2)), ("order", i4, (2 * S + 2,)), ("hidden", i1, (S,)),  # work space of the shadow test
+        # work space of the shadow test (sensors/shadow.py) and of the hull distance (world/geometry.py)
+        ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("order", i4, (S,)), ("hidden", i1, (S,)),
+        ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)), ("hull", f8, (2, 5, 2)),
     ], align=True)  # fmt: skip
 
 

@@ -1,0 +1,101 @@
+"""One tick of a world, and the entry points that advance a batch.
+
+Order within a tick: weather, actuators, own-ship dynamics; at the end of a traffic frame the traffic, the collision sweep and
+the next frame's decisions; then the sensors that are due.  What a sensor sees is therefore the world at its own tick.
+"""
+
+from __future__ import annotations
+
+from .jit import inner, kernel
+from .sensors.nav import navigate
+from .sensors.schedule import first_events, sense
+from .traffic.ships import follow_route, move_traffic, steer
+from .world.actuators import actuate
+from .world.disturbance import wave_step, weather_reset, weather_step
+from .world.dynamics import plant_step
+from .world.safety import begin_frame, sweep
+from .world.state import MODEL_3DOF
+
+
+@inner
+def tick_world(w, rows, row):
+    """Advance one world by one tick.
+
+    ``rows[row]`` [n, A, 3] are commands to plant 0 that arrive within the tick, in order (a thrust log faster than the
+    tick); with n = 0 the command in the record holds.
+    """
+    w.tick += 1
+    tick = w.tick
+    if w.weather.on:
+        weather_step(w, tick)
+    v = w.vessels
+    for j in range(v.active.shape[0]):
+        if v.active[j] and v.model[j] == MODEL_3DOF:
+            p = v.plant[j]
+            if rows.shape[1] > 0 and p == 0:
+                n = rows.shape[1]
+                for i in range(n):
+                    for a in range(rows.shape[2]):
+                        for c in range(3):
+                            w.plants.command[0, a, c] = rows[row, i, a, c]
+                    actuate(w, p, w.dt / n)
+            else:
+                actuate(w, p, w.dt)
+            if w.weather.on:
+                wave_step(w, p, j, tick)
+            plant_step(w, j, p, w.dt)
+    if tick - w.frame_tick >= w.frame_ticks:
+        end_frame(w)
+    if tick >= w.next_nav:
+        navigate(w, tick)
+    if tick >= w.next_sense:
+        move_traffic(w, tick)
+        sense(w, tick)
+
+
+@inner
+def end_frame(w):
+    """Close the traffic frame that ends now and decide the next one."""
+    move_traffic(w, w.tick)
+    sweep(w)
+    for o in range(w.observer.shape[0]):
+        j = w.observer[o]
+        if w.vessels.model[j] == MODEL_3DOF:
+            follow_route(w, j)
+    begin_frame(w)
+    steer(w, w.frame_ticks * w.dt)
+
+
+@inner
+def reset_world(w):
+    """Bring a freshly written world to tick 0: weather state, first decisions, first navigation, sensor schedule."""
+    w.tick = 0
+    w.traffic_tick = 0
+    weather_reset(w)
+    begin_frame(w)
+    steer(w, w.frame_ticks * w.dt)
+    sweep(w)
+    for o in range(w.observer.shape[0]):
+        w.safety.step_closest[o] = 1.0e9
+    navigate(w, 0)
+    first_events(w)
+
+
+@kernel
+def reset_worlds(worlds, mask):
+    """Reset the rows of ``worlds`` [B] where ``mask`` [B] is true; the others are not touched."""
+    for b in range(worlds.shape[0]):
+        if mask[b]:
+            reset_world(worlds[b])
+
+
+@kernel
+def advance_worlds(worlds, ticks, rows):
+    """Advance every world by ``ticks``.
+
+    rows: float64 [ticks, n, A, 3], commands to plant 0 of every world, n of them within each tick; [0, 0, A, 3] to let the
+    commands in the records hold.
+    """
+    for b in range(worlds.shape[0]):
+        for k in range(ticks):
+            tick_world(worlds[b], rows, k)

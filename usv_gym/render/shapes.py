@@ -1,0 +1,87 @@
+"""Outlines in metres {n}: hulls, icebergs, ellipses, arcs and radar shadows.  Plain NumPy, no drawing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..world.geometry import BOW_TAPER
+from .primitives import Points
+
+#: the hull of world/geometry.py in units of length and beam, clockwise from the bow (forward, starboard)
+HULL = np.array([(0.5, 0.0), (0.5 - BOW_TAPER, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5 - BOW_TAPER, -0.5)])
+DECKHOUSE = np.array([(-0.22, 0.34), (-0.40, 0.34), (-0.40, -0.34), (-0.22, -0.34)])
+#: AIS target symbol (IMO SN.1/Circ.243): an acute triangle, pointing along the heading
+TRIANGLE = np.array([(0.62, 0.0), (-0.38, 0.33), (-0.38, -0.33)])
+
+
+def placed(unit: Points, north: float, east: float, psi: float, length: float, beam: float | None = None) -> Points:
+    """Outline given in units of (length, beam) {b}, scaled, turned by psi [rad] and moved to (north, east) [m]."""
+    xy = unit * (length, length if beam is None else beam)
+    s, c = math.sin(psi), math.cos(psi)
+    return xy @ np.array([(c, s), (-s, c)]) + (north, east)
+
+
+def arc(centre: tuple[float, float], radius: float, start: float, stop: float, n: int = 24) -> Points:
+    """Points on a circle between two true bearings [rad]."""
+    b = np.linspace(start, stop, n)
+    return np.column_stack((centre[0] + radius * np.cos(b), centre[1] + radius * np.sin(b)))
+
+
+def ellipse(centre: tuple[float, float], semi_along: float, semi_across: float, psi: float, n: int = 40) -> Points:
+    """Ellipse with its first axis along the bearing psi [rad]."""
+    unit = arc((0.0, 0.0), 1.0, 0.0, 2.0 * math.pi, n)[:-1]
+    return placed(unit, *centre, psi, semi_along, semi_across)
+
+
+def covariance_ellipse(
+    centre: tuple[float, float], nn: float, ne: float, ee: float, sigmas: float = 2.0, n: int = 40
+) -> Points:
+    """Contour of ``sigmas`` standard deviations of a position with covariance [[nn, ne], [ne, ee]] [m^2]."""
+    values, vectors = np.linalg.eigh(np.array([(nn, ne), (ne, ee)]))
+    major, minor = sigmas * np.sqrt(np.maximum(values[::-1], 0.0))
+    return ellipse(centre, float(major), float(minor), math.atan2(vectors[1, 1], vectors[0, 1]), n)
+
+
+def crag(centre: tuple[float, float], radius: float, index: int) -> tuple[Points, Points]:
+    """Irregular outline that lies in the disc of ``radius`` and touches it, and its shaded side; the same for an index."""
+    rng = np.random.default_rng(1009 + index)
+    n = int(rng.integers(9, 14))
+    bearing = (np.arange(n) + rng.uniform(-0.3, 0.3, n)) * (2.0 * math.pi / n)
+    r = rng.uniform(0.74, 1.0, n)
+    r *= radius / r.max()
+    rim = np.column_stack((np.cos(bearing), np.sin(bearing))) * r[:, None]
+    # light comes from the north-west: the rim facing south-east, closed over a ridge near the middle, is in shade
+    facing = np.roll(np.arange(n), -int(np.argmin(np.abs(bearing - math.pi * 0.3))))[: n // 2 + 1]
+    ridge = rim[facing][::-1] * rng.uniform(0.05, 0.4, (len(facing), 1)) - 0.06 * radius
+    shade = np.vstack((rim[facing], ridge[1:-1]))
+    return rim + centre, shade + centre
+
+
+def half_width(length: float, beam: float, aspect: float) -> float:
+    """Half the width [m] a hull shows at the angle ``aspect`` [rad] from its centre line (as the sensors reckon it)."""
+    return 0.5 * (abs(length * math.sin(aspect)) + abs(beam * math.cos(aspect)))
+
+
+def shadow(observer: tuple[float, float], centre: tuple[float, float], half: float, reach: float) -> Points | None:
+    """Area hidden behind a disc of radius ``half`` [m], out to ``reach`` [m] from the observer.
+
+    Starts at the two tangent points; None when the observer is inside the disc or the disc is out of reach.
+    """
+    dn, de = centre[0] - observer[0], centre[1] - observer[1]
+    d = math.hypot(dn, de)
+    if half <= 0.0 or d <= half or d >= reach:
+        return None
+    bearing, opening = math.atan2(de, dn), math.asin(half / d)
+    tangent = math.sqrt(d * d - half * half)
+    near = arc(observer, tangent, bearing + opening, bearing - opening, 2)
+    far = arc(observer, reach, bearing - opening, bearing + opening, 2 + int(opening * 40.0))
+    return np.vstack((near, far))
+
+
+def nice_step(span: float, parts: float) -> float:
+    """1, 2 or 5 times a power of ten, such that ``span`` has about ``parts`` of them."""
+    raw = max(span / parts, 1e-9)
+    power = 10.0 ** math.floor(math.log10(raw))
+    return float(next(f * power for f in (1.0, 2.0, 5.0, 10.0) if raw <= f * power * 1.0001))

@@ -1,0 +1,369 @@
+"""Native schema of a scenario: one sea with its weather, own ship, traffic and obstacles, frozen once it is read.
+
+SI units and degrees; other units are named in the key.  Wind and waves come *from*, the current sets *to*.  Places are
+``[north, east]`` metres from the origin, or ``{latitude_deg, longitude_deg}``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+from pydantic import (
+    AwareDatetime,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from ..config import ConfigError, Model, locate, problem
+from ..units import KNOT, metres_per_degree
+from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
+
+Latitude = Annotated[float, Field(strict=True, ge=-90, le=90)]
+Longitude = Annotated[float, Field(strict=True, ge=-180, le=180)]
+Direction = Annotated[float, Field(strict=True, ge=-360, le=360)]
+Name = Annotated[str, Field(pattern=r"^[^\s.=](?:[^.=\x00-\x1f]*[^\s.=])?$", max_length=80)]
+Preset = Literal["standard", "original"]
+
+MAX_WAYPOINTS = 32  #: that a route in the world record holds
+OWN_SHIP = "own_ship"  #: name of vessel slot 0
+DT = 0.05  #: [s] tick of the thesis
+
+
+# --- ship classes ----------------------------------------------------------------------------------------------------
+class ShipClass(NamedTuple):
+    """What a ship is like when the file does not say (thesis 3.1.1: size, speed, agility, use of AIS)."""
+
+    length: float  # [m]
+    speed_kn: float
+    turn_time: float  # time constant of the heading filter [s]
+    max_turn_rate_deg: float  # [deg/s]
+    ais: Literal["A", "B"]
+
+
+#: 10 s is the thesis's heading filter.  Largest turn rates: about 4 lengths of turning diameter at the default speed
+SHIP_CLASSES: Mapping[str, ShipClass] = {
+    "ship": ShipClass(100.0, 10.0, 10.0, 1.5, "A"),
+    "vessel": ShipClass(30.0, 8.0, 10.0, 4.0, "A"),
+    "boat": ShipClass(8.0, 12.0, 3.0, 15.0, "B"),
+}
+CONSTANT_TURN_RATE_DEG = 5.0  #: [deg/s] of every ship in the original program
+
+
+def class_of_length(length: float) -> str:
+    """Class of a ship that has only a length [m]: ship above 50 m, vessel above 15 m, else boat."""
+    return "ship" if length > 50.0 else "vessel" if length > 15.0 else "boat"
+
+
+# --- places ----------------------------------------------------------------------------------------------------------
+class GeoPoint(Model):
+    """A place on the globe, WGS-84."""
+
+    latitude_deg: Latitude
+    longitude_deg: Longitude
+
+
+def _kind_of_place(value: Any) -> str | None:
+    if isinstance(value, GeoPoint | Mapping):
+        return "geo"
+    return "local" if isinstance(value, list | tuple) and len(value) == 2 else None
+
+
+Position = Annotated[
+    Annotated[tuple[Number, Number], Tag("local")] | Annotated[GeoPoint, Tag("geo")],
+    Discriminator(
+        _kind_of_place,
+        custom_error_type="place",
+        custom_error_message="expected [north, east] in metres or {latitude_deg, longitude_deg}",
+    ),
+]
+
+
+class Origin(Model):
+    """Where {n} touches the earth."""
+
+    latitude_deg: Annotated[float, Field(strict=True, ge=-89, le=89)]
+    longitude_deg: Longitude
+
+
+# --- groups ----------------------------------------------------------------------------------------------------------
+class Simulation(Model):
+    """Time and area.  Intervals are whole numbers of ticks, kept in whole microseconds."""
+
+    dt: Annotated[float, Field(strict=True, gt=0, le=1)] = DT
+    traffic_interval: Positive = Field(default=0.1, description="[s] ships decide and distances are swept this often")
+    control_interval: Positive = Field(default=1.0, description="[s] between two actions")
+    duration: Positive = Field(default=300.0, description="[s] an episode is truncated after this time")
+    area: Positive | None = Field(default=None, description="half size [m] of the square around the origin; none: open")
+    epoch: AwareDatetime = Field(default=datetime(2017, 6, 1, 12, tzinfo=UTC), description="UTC at the start")
+
+    @model_validator(mode="after")
+    def _whole_ticks(self) -> Self:
+        if abs(self.dt * 1e6 - self.dt_us) > 1e-6 * self.dt_us:
+            raise problem(f"expected a whole number of microseconds, got {self.dt!r} s", "dt")
+        for key in ("traffic_interval", "control_interval"):
+            value = getattr(self, key)
+            ticks = value / self.dt
+            if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-9 * ticks:
+                raise problem(
+                    f"expected a whole number of ticks of {self.dt:g} s, got {value:g} s ({ticks:.6g} ticks)", key
+                )
+        return self
+
+    @property
+    def dt_us(self) -> int:
+        """Tick [us]."""
+        return max(round(self.dt * 1e6), 1)
+
+    @property
+    def frame_ticks(self) -> int:
+        """Ticks per traffic frame."""
+        return round(self.traffic_interval / self.dt)
+
+    @property
+    def control_ticks(self) -> int:
+        """Ticks per control step."""
+        return round(self.control_interval / self.dt)
+
+
+class Wind(Model):
+    """Wind at 10 m height."""
+
+    speed: NonNegative = 0.0
+    from_deg: Direction = 0.0
+    gusts: Flag = Field(default=True, description="false: wind and current are steady")
+
+
+class Current(Model):
+    """Surface current."""
+
+    speed: NonNegative = 0.0
+    to_deg: Direction = 0.0
+
+
+class Waves(Model):
+    """Sea state."""
+
+    height: NonNegative = Field(default=0.0, description="significant wave height [m]")
+    from_deg: Direction = 0.0
+
+
+class Visibility(Model):
+    """What rain or fog does to the sensors; 1 is clear."""
+
+    radar_range: Share = Field(default=1.0, description="share of the radar's range that is left")
+    lidar_range: Share = Field(default=1.0, description="share of the LiDAR's range that is left")
+    detection: Share = Field(default=1.0, description="factor of the probability of detection")
+
+
+class Weather(Model):
+    """Wind, current, waves and visibility."""
+
+    wind: Wind = Wind()
+    current: Current = Current()
+    waves: Waves = Waves()
+    visibility: Visibility = Visibility()
+
+
+class OwnShip(Model):
+    """The USV: which vessel, where it starts, where it is going."""
+
+    vessel: str = Field(default="odin", description="name in configs/vessels, or path of a YAML file")
+    position: Position = (0.0, 0.0)
+    heading_deg: Direction = 0.0
+    speed: Number = Field(default=0.0, description="ahead, over ground [m/s]")
+    route: Annotated[tuple[Position, ...], Field(max_length=MAX_WAYPOINTS - 1)] = Field(
+        default=(), description="waypoints to reach, without the start"
+    )
+    acceptance_radius: Positive = Field(default=20.0, description="[m]")
+    memory: Flag = Field(default=False, description="fluid-memory forces")
+    ais: Literal["A", "B", "off"] = "A"
+    mmsi: Annotated[int, Field(strict=True, ge=201_000_000, le=775_999_999)] | None = None
+
+    @field_validator("vessel")
+    @classmethod
+    def _vessel_exists(cls, value: str, info: ValidationInfo) -> str:
+        try:
+            locate("vessels", value, (info.context or {}).get("directory"))
+        except ConfigError as error:
+            raise problem(str(error)) from None
+        return value
+
+
+def _by_class(what: str) -> Callable[[dict[str, Any]], Any]:
+    # pydantic gives a default factory the fields validated so far; after a bad class any default will do
+    return lambda fields: getattr(SHIP_CLASSES[fields.get("class_", "vessel")], what)
+
+
+class Ship(Model):
+    """A ship that follows waypoints; the first one is where it starts, heading for the second."""
+
+    class_: Literal["ship", "vessel", "boat"] = Field(
+        default="vessel", alias="class", description="default: by length, ship above 50 m, vessel above 15 m, else boat"
+    )
+    length: Positive = Field(default_factory=_by_class("length"), description="[m]")
+    beam: Positive = Field(default_factory=lambda fields: fields.get("length", 6.0) / 6.0, description="[m]; L / 6")
+    speed: NonNegative | None = Field(default=None, description="[m/s]")
+    speed_kn: NonNegative | None = Field(default=None, description="[kn]; neither: by class")
+    waypoints: Annotated[tuple[Position, ...], Field(max_length=MAX_WAYPOINTS)]
+    after_last: Literal["stop", "continue", "loop"] = "stop"
+    acceptance_radius: Positive = Field(default=50.0, description="[m]")
+    turn: Literal["lowpass", "constant"] | None = Field(
+        default=None, description="low-pass filter, or constant rate; default: by preset (the original: constant)"
+    )
+    turn_time: Positive = Field(default_factory=_by_class("turn_time"), description="time constant of the filter [s]")
+    max_turn_rate_deg: Positive | None = Field(default=None, description="[deg/s]; default: by class, or 5 if constant")
+    ais: Annotated[
+        Literal["A", "B", "off", "auto"], BeforeValidator(lambda value: "off" if value is False else value)
+    ] = Field(default="auto", description="auto: by class")
+    mmsi: Annotated[int, Field(strict=True, ge=201_000_000, le=775_999_999)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _class_from_length(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and "class" not in data and isinstance(data.get("length"), int | float):
+            return {"class": class_of_length(data["length"]), **data}
+        return data
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if len(self.waypoints) < 2:
+            raise problem(f"needs at least two waypoints, got {len(self.waypoints)}", "waypoints")
+        if self.speed is not None and self.speed_kn is not None:
+            raise problem("give speed or speed_kn, not both", "speed_kn")
+        return self
+
+    @property
+    def set_speed(self) -> float:
+        """Speed over ground [m/s]."""
+        if self.speed is not None:
+            return self.speed
+        return KNOT * (SHIP_CLASSES[self.class_].speed_kn if self.speed_kn is None else self.speed_kn)
+
+    @property
+    def ais_class(self) -> Literal["A", "B", "off"]:
+        """AIS station on board."""
+        return SHIP_CLASSES[self.class_].ais if self.ais == "auto" else self.ais
+
+    def turns_constantly(self, preset: Preset) -> bool:
+        """True if the ship turns at a constant rate instead of through the low-pass filter."""
+        return self.turn == "constant" or (self.turn is None and preset == "original")
+
+    def turn_rate(self, preset: Preset) -> float:
+        """Largest turn rate [deg/s]."""
+        if self.max_turn_rate_deg is not None:
+            return self.max_turn_rate_deg
+        constant = self.turns_constantly(preset)
+        return CONSTANT_TURN_RATE_DEG if constant else SHIP_CLASSES[self.class_].max_turn_rate_deg
+
+
+def _drift(value: Any) -> Any:
+    pair = isinstance(value, list | tuple) and len(value) == 2
+    if value not in ("none", "current") and not (
+        pair and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+    ):
+        raise problem(f"expected 'none', 'current' or [north, east] in m/s, got {value!r}")
+    return value
+
+
+class Obstacle(Model):
+    """A disc: fixed, carried by the current, or drifting at a velocity of its own."""
+
+    kind: Literal["iceberg", "buoy", "islet", "lighthouse", "platform"] = "iceberg"
+    position: Position
+    radius: Positive
+    drift: Annotated[Literal["none", "current"] | tuple[float, float], BeforeValidator(_drift)] = Field(
+        default="none", description="none, current, or velocity [north, east] [m/s]"
+    )
+    ais: Flag = Field(default=False, description="carries an AIS aid-to-navigation station")
+    mmsi: Annotated[int, Field(strict=True, ge=992_000_000, le=997_999_999)] | None = None
+
+
+# --- scenario --------------------------------------------------------------------------------------------------------
+class Scenario(Model):
+    """Everything a world is made of."""
+
+    schema_version: Literal[1] = Field(default=1, alias="schema")
+    name: str = ""
+    description: str = ""
+    preset: Preset = Field(default="standard", description="original: constants and quirks of the simulator of 2017")
+    origin: Origin = Origin(latitude_deg=59.4377744115633, longitude_deg=10.4716511800410)
+    simulation: Simulation = Simulation()
+    weather: Weather = Weather()
+    own_ship: OwnShip = Field(default_factory=OwnShip)
+    ships: dict[Name, Ship] = Field(default_factory=dict)
+    obstacles: dict[Name, Obstacle] = Field(default_factory=dict)
+    sensors: Annotated[Sensors, BeforeValidator(expand_sensors, json_schema_input_type=str | SensorsInput)] = Field(
+        default="thesis", validate_default=True, description="name in configs/sensors, path, or mapping with `base`"
+    )
+
+    @model_validator(mode="after")
+    def _names_and_numbers_are_unique(self) -> Self:
+        for group in ("ships", "obstacles"):
+            if OWN_SHIP in getattr(self, group):
+                raise problem("this name is that of the own ship", group, OWN_SHIP)
+        for name in self.obstacles:
+            if name in self.ships:
+                raise problem("a ship has this name already", "obstacles", name)
+        given: dict[int, tuple[str, ...]] = {}
+        for path, thing in self._stations():
+            if thing.mmsi is not None:
+                if thing.mmsi in given:
+                    raise problem(f"{thing.mmsi} is that of {'.'.join(given[thing.mmsi])} already", *path, "mmsi")
+                given[thing.mmsi] = path
+        for name, ship in self.ships.items():
+            if self.local(ship.waypoints[0]) == self.local(ship.waypoints[1]):
+                raise problem("the first two are the same place: no direction to start in", "ships", name, "waypoints")
+        return self
+
+    def _stations(self) -> list[tuple[tuple[str, ...], OwnShip | Ship | Obstacle]]:
+        return [
+            ((OWN_SHIP,), self.own_ship),
+            *((("ships", name), ship) for name, ship in self.ships.items()),
+            *((("obstacles", name), obstacle) for name, obstacle in self.obstacles.items()),
+        ]
+
+    def local(self, position: tuple[float, float] | GeoPoint) -> tuple[float, float]:
+        """Place in {n}: north, east of the origin [m]."""
+        if not isinstance(position, GeoPoint):
+            return position
+        north, east = metres_per_degree(self.origin.latitude_deg)
+        # the short way round, also across the date line
+        turn = (position.longitude_deg - self.origin.longitude_deg + 180.0) % 360.0 - 180.0
+        return (position.latitude_deg - self.origin.latitude_deg) * north, turn * east
+
+    def mmsis(self) -> dict[str, int]:
+        """MMSI of own ship, ships and obstacles by name: as given, else the next free from 257000001 and 992570001."""
+        stations = [(path[-1], thing) for path, thing in self._stations()]
+        taken = {thing.mmsi for _, thing in stations}
+        vessel = _free(257_000_001, taken)
+        aid = _free(992_570_001, taken)
+        return {
+            name: thing.mmsi or (next(aid) if isinstance(thing, Obstacle) else next(vessel)) for name, thing in stations
+        }
+
+    def sensor_rates(self) -> dict[str, float]:
+        """Rate [Hz] of every periodic sensor by key path."""
+        s = self.sensors
+        rates = {f"navigation.{key}": getattr(s.navigation, key).rate for key in type(s.navigation).model_fields}
+        scans = {"radar": 1.0 / s.radar.period, "lidar": s.lidar.rate, "tdm": s.tdm.rate}
+        return rates | scans
+
+    def faster_than_tick(self) -> dict[str, float]:
+        """Sensors [Hz] that are asked to fire more often than there are ticks; they fire every tick."""
+        return {key: rate for key, rate in self.sensor_rates().items() if rate * self.simulation.dt > 1.0 + 1e-9}
+
+
+def _free(first: int, taken: Iterable[int | None]) -> Any:
+    used = set(taken)
+    number = first
+    while True:
+        if number not in used:
+            yield number
+        number += 1

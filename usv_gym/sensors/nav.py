@@ -1,0 +1,104 @@
+"""Own navigation: GNSS with heading (Seapath), MRU, IMU, speed log and wind sensor, each at its own rate (thesis B.1).
+
+In a 3-DOF world roll, pitch and heave are zero, so the MRU gives heading and yaw rate only.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .. import rng
+from ..jit import inner
+from ..trig import atan2, sincos, wrap, wrap_positive
+from .ais import next_fire
+
+
+@inner
+def follow_own_route(w, o):
+    """Advance the observer's own idea of its active waypoint, from the position it measures."""
+    j = w.observer[o]
+    r, nav = w.routes, w.nav
+    while nav.leg[o] < r.count[j]:
+        k = nav.leg[o]
+        dn = r.waypoint[j, k, 0] - nav.position[o, 0]
+        de = r.waypoint[j, k, 1] - nav.position[o, 1]
+        reached = dn * dn + de * de <= r.radius[j] * r.radius[j]
+        if not reached and k > 0:
+            ln = r.waypoint[j, k, 0] - r.waypoint[j, k - 1, 0]
+            le = r.waypoint[j, k, 1] - r.waypoint[j, k - 1, 1]
+            reached = ln * dn + le * de < 0.0 and dn * dn + de * de <= 9.0 * r.radius[j] * r.radius[j]
+        if not reached:
+            return
+        nav.leg[o] += 1
+    nav.route_done[o] = r.count[j] > 0
+
+
+@inner
+def navigate(w, tick):
+    """Fire every navigation sensor that is due and set ``w.next_nav``."""
+    nav, p, v = w.nav, w.sensors, w.vessels
+    soonest = tick + (1 << 40)
+    for o in range(w.observer.shape[0]):
+        j = w.observer[o]
+        psi, r = v.eta[j, 2], v.nu[j, 2]
+        if tick >= nav.gnss_next[o]:
+            nav.gnss_next[o] = next_fire(tick, w.dt_us, p.gnss_period_us)
+            if p.gnss_frozen == 0:
+                n0, n1 = rng.normal2(w.seed, rng.GNSS, o * 2, tick)
+                n2, n3 = rng.normal2(w.seed, rng.GNSS, o * 2 + 1, tick)
+                nav.position[o, 0] = v.eta[j, 0] + p.gnss_drift[0] + p.gnss_noise[0] * n0
+                nav.position[o, 1] = v.eta[j, 1] + p.gnss_drift[1] + p.gnss_noise[0] * n1
+                sog = math.hypot(v.velocity[j, 0], v.velocity[j, 1])
+                h0, _ = rng.normal2(w.seed, rng.HEADING, o, tick)
+                nav.heading[o] = wrap_positive(psi + p.gnss_noise[1] * h0)
+                course = atan2(v.velocity[j, 1], v.velocity[j, 0]) if sog > 1.0e-9 else psi
+                nav.course[o] = wrap_positive(course + p.gnss_noise[2] * n2)
+                nav.sog[o] = max(sog + p.gnss_noise[3] * n3, 0.0)
+                nav.gnss_stamp_us[o] = tick * w.dt_us
+                follow_own_route(w, o)
+        if tick >= nav.mru_next[o]:
+            nav.mru_next[o] = next_fire(tick, w.dt_us, p.mru_period_us)
+            n0, n1 = rng.normal2(w.seed, rng.MRU, o, tick)
+            nav.mru_heading[o] = wrap_positive(psi + p.mru_noise[0] * n0)
+            nav.yaw_rate[o] = r + p.mru_noise[1] * n1
+        if tick >= nav.imu_next[o]:
+            nav.imu_next[o] = next_fire(tick, w.dt_us, p.imu_period_us)
+            seconds = (tick - nav.imu_tick[o]) * w.dt
+            du = dv = 0.0
+            if seconds > 0.0:
+                du = (v.nu[j, 0] - nav.imu_nu[o, 0]) / seconds
+                dv = (v.nu[j, 1] - nav.imu_nu[o, 1]) / seconds
+            n0, n1 = rng.normal2(w.seed, rng.IMU, o * 2, tick)
+            n2, _ = rng.normal2(w.seed, rng.IMU, o * 2 + 1, tick)
+            nav.specific_force[o, 0] = du - v.nu[j, 1] * r + p.imu_noise[0] * n0
+            nav.specific_force[o, 1] = dv + v.nu[j, 0] * r + p.imu_noise[0] * n1
+            nav.imu_yaw_rate[o] = r + p.imu_noise[1] * n2
+            nav.imu_tick[o] = tick
+            for k in range(3):
+                nav.imu_nu[o, k] = v.nu[j, k]
+        if tick >= nav.log_next[o]:
+            nav.log_next[o] = next_fire(tick, w.dt_us, p.log_period_us)
+            n0, n1 = rng.normal2(w.seed, rng.SPEED_LOG, o, tick)
+            nav.water_speed[o, 0] = v.nu[j, 0] + p.log_noise * n0
+            nav.water_speed[o, 1] = v.nu[j, 1] + p.log_noise * n1
+        if tick >= nav.wind_next[o]:
+            nav.wind_next[o] = next_fire(tick, w.dt_us, p.wind_period_us)
+            n0, n1 = rng.normal2(w.seed, rng.WIND_SENSOR, o, tick)
+            speed, angle = _relative_wind(w, j)
+            nav.wind_speed[o] = max(speed + p.wind_noise[0] * n0, 0.0)
+            nav.wind_angle[o] = wrap(angle + p.wind_noise[1] * n1)
+        soonest = min(soonest, nav.gnss_next[o], nav.mru_next[o], nav.imu_next[o], nav.log_next[o], nav.wind_next[o])
+    w.next_nav = soonest
+
+
+@inner
+def _relative_wind(w, j):
+    """Wind relative to vessel j at sensor height: speed [m/s] and the angle it comes from, off the bow [rad], starboard +."""
+    speed = w.weather.wind_u10 * w.weather.wind_height_factor if w.weather.on else 0.0
+    s, c = sincos(w.weather.wind_direction)
+    dn = speed * c - w.vessels.velocity[j, 0]
+    de = speed * s - w.vessels.velocity[j, 1]
+    strength = math.hypot(dn, de)
+    if strength == 0.0:
+        return 0.0, 0.0
+    return strength, wrap(atan2(-de, -dn) - w.vessels.eta[j, 2])

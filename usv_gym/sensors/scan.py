@@ -1,0 +1,106 @@
+"""Radar and LiDAR: one scan of an observer measures position and size of all it can see.
+
+Seen is what lies within range, beyond the minimum range, not in the shadow of something nearer, and is detected:
+P_d = detection * a^2 / (a^2 + detection_radius^2) for the half-width a that the source shows.  A measurement is relative to
+the own ship and is reported at the own ship's *measured* position.  Its error is f(d) (b + v), f(d) = k d, with a slowly
+drifting bias b and white noise v (thesis 2.4-2.5); the bias is discretised exactly.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .. import rng
+from ..jit import inner
+from ..world.state import LIDAR, RADAR
+from .shadow import apparent_half_width, cast_shadows, look_around
+from .tdm import take_scan
+
+
+@inner
+def _error(w, o, k, s, tick, noise, bias, bias_time, stream_bias, stream_noise):
+    """Error (N, E, radius) of a scan at f(d) = 1: drifting bias plus white noise."""
+    t = w.tracks
+    O = w.observer.shape[0]
+    slot = (s * O + o) * 2
+    b0, b1 = rng.normal2(w.seed, stream_bias, slot, tick)
+    b2, n2 = rng.normal2(w.seed, stream_bias, slot + 1, tick)
+    n0, n1 = rng.normal2(w.seed, stream_noise, slot, tick)
+    b = t.scan_bias[o, k, s]
+    now = tick * w.dt_us
+    seconds = (now - t.scan_bias_us[o, k, s]) * 1.0e-6
+    fresh = t.scan_bias_us[o, k, s] < 0
+    t.scan_bias_us[o, k, s] = now
+    a0 = 0.0 if fresh or bias_time[0] <= 0.0 else math.exp(-seconds / bias_time[0])
+    a1 = 0.0 if fresh or bias_time[1] <= 0.0 else math.exp(-seconds / bias_time[1])
+    g0 = bias[0] * math.sqrt(1.0 - a0 * a0)
+    g1 = bias[1] * math.sqrt(1.0 - a1 * a1)
+    b[0] = a0 * b[0] + g0 * b0
+    b[1] = a0 * b[1] + g0 * b1
+    b[2] = a1 * b[2] + g1 * b2
+    return b[0] + noise[0] * n0, b[1] + noise[0] * n1, b[2] + noise[1] * n2
+
+
+@inner
+def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection):
+    t = w.tracks
+    own = w.observer[o]
+    S = t.id.shape[1]
+    for s in range(S):
+        t.visible[o, k, s] = 0
+    if sensor.outage:
+        return
+    count = look_around(w, own, reach)
+    cast_shadows(w, count)
+    V = w.vessels.active.shape[0]
+    for i in range(count):
+        s = w.order[i]
+        if w.hidden[s]:
+            continue
+        t.visible[o, k, s] = 1
+        d = w.ranges[s]
+        if d < sensor.range_min:
+            continue
+        shown = apparent_half_width(w, s)
+        detection = sensor.detection * w.weather.detection_factor
+        if sensor.detection_radius > 0.0:
+            detection *= shown * shown / (shown * shown + sensor.detection_radius * sensor.detection_radius)
+        if detection < 1.0 and rng.uniform(
+            w.seed, stream_detection, s * w.observer.shape[0] + o, tick
+        ) >= detection:
+            continue
+        en, ee, er = _error(w, o, k, s, tick, sensor.noise, sensor.bias, sensor.bias_time, stream_bias, stream_noise)
+        f = sensor.gain * d
+        if s < V:
+            dn = w.vessels.eta[s, 0] - w.vessels.eta[own, 0]
+            de = w.vessels.eta[s, 1] - w.vessels.eta[own, 1]
+            radius = 0.5 * max(w.vessels.length[s], w.vessels.beam[s])
+        else:
+            dn = w.obstacles.position[s - V, 0] - w.vessels.eta[own, 0]
+            de = w.obstacles.position[s - V, 1] - w.vessels.eta[own, 1]
+            radius = w.obstacles.radius[s - V]
+        dn += f * en
+        de += f * ee
+        t.measured[o, k, s, 0] = w.nav.position[o, 0] + dn
+        t.measured[o, k, s, 1] = w.nav.position[o, 1] + de
+        t.measured[o, k, s, 2] = max(radius + f * er, w.sensors.radius_min)
+        # the controller's side knows the measured range only
+        t.measured[o, k, s, 3] = max(sensor.gain * math.hypot(dn, de), sensor.gain_floor)
+        t.measured_us[o, k, s] = tick * w.dt_us
+        take_scan(w, o, k, s, sensor, t.measured[o, k, s], tick * w.dt_us)
+
+
+@inner
+def scan_radar(w, o, tick):
+    """One revolution of the radar of observer o."""
+    p = w.sensors.radar
+    _scan(w, o, RADAR - 1, p, p.range * w.weather.radar_range_factor, tick,
+          rng.RADAR_BIAS, rng.RADAR_NOISE, rng.RADAR_DETECTION)  # fmt: skip
+
+
+@inner
+def scan_lidar(w, o, tick):
+    """One sweep of the LiDAR of observer o."""
+    p = w.sensors.lidar
+    _scan(w, o, LIDAR - 1, p, p.range * w.weather.lidar_range_factor, tick,
+          rng.LIDAR_BIAS, rng.LIDAR_NOISE, rng.LIDAR_DETECTION)  # fmt: skip

@@ -1,0 +1,71 @@
+"""Which exteroceptive sensor fires when: one look at the clock per tick, O(S) work only when something is due."""
+
+from __future__ import annotations
+
+from ..jit import inner
+from .ais import NEVER, next_fire, schedule, transmit
+from .scan import scan_lidar, scan_radar
+from .tdm import publish, take_ais
+
+
+@inner
+def first_events(w):
+    """Schedule the first transmissions and set ``w.next_sense``."""
+    S = w.ais.next_tick.shape[0]
+    for s in range(S):
+        w.ais.last_tick[s] = -1
+        w.ais.next_tick[s] = NEVER
+        if w.sensors.exteroceptive:
+            schedule(w, s, 0)
+    _set_next(w, 0)
+
+
+@inner
+def _set_next(w, tick):
+    p = w.sensors
+    soonest = NEVER
+    if p.exteroceptive:
+        for s in range(w.ais.next_tick.shape[0]):
+            soonest = min(soonest, w.ais.next_tick[s])
+        for o in range(w.observer.shape[0]):
+            for s in range(w.ais.next_tick.shape[0]):
+                if w.ais.due_tick[o, s] > tick:
+                    soonest = min(soonest, w.ais.due_tick[o, s])
+        if p.radar.on:
+            soonest = min(soonest, next_fire(tick, w.dt_us, p.radar.period_us))
+        if p.lidar.on:
+            soonest = min(soonest, next_fire(tick, w.dt_us, p.lidar.period_us))
+        soonest = min(soonest, next_fire(tick, w.dt_us, p.tdm_period_us))
+    w.next_sense = soonest
+
+
+@inner
+def _due(tick, dt_us, period_us):
+    return period_us > 0 and (tick * dt_us) // period_us > ((tick - 1) * dt_us) // period_us
+
+
+@inner
+def sense(w, tick):
+    """Fire everything that is due at ``tick``: transmissions, receptions, scans, then the TDM's report."""
+    p = w.sensors
+    S = w.ais.next_tick.shape[0]
+    for s in range(S):
+        if tick >= w.ais.next_tick[s]:
+            transmit(w, s, tick)
+    radar = p.radar.on and _due(tick, w.dt_us, p.radar.period_us)
+    lidar = p.lidar.on and _due(tick, w.dt_us, p.lidar.period_us)
+    report = _due(tick, w.dt_us, p.tdm_period_us)
+    for o in range(w.observer.shape[0]):
+        if w.vessels.active[w.observer[o]] == 0:
+            continue
+        for s in range(S):
+            if 0 <= w.ais.due_tick[o, s] <= tick:
+                w.ais.due_tick[o, s] = -1
+                take_ais(w, o, s)
+        if radar:
+            scan_radar(w, o, tick)
+        if lidar:
+            scan_lidar(w, o, tick)
+        if report:
+            publish(w, o, tick)
+    _set_next(w, tick)

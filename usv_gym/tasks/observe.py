@@ -1,0 +1,196 @@
+"""Observation kernels: what the controller gets to see, from own navigation and the sensor picture only.
+
+``truth`` is the one exception, for ablation.  Layouts: tasks/task.py.  Everything is clipped into its bounds.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import inner
+from ..trig import PI, TWO_PI, atan2, clip, sincos, wrap
+from ..world.state import DESCRIPTOR_VESSEL
+from .task import N_OWN, N_TARGET, OBS_AIS, OBS_SECTORS, OBS_TRACKS, OBS_TRUTH
+
+
+@inner
+def cross_track_error(ax, ay, bx, by, n, e):
+    """Signed distance [m] of a point from the line a -> b, + to starboard of its direction."""
+    dn, de = bx - ax, by - ay
+    length = math.hypot(dn, de)
+    return (dn * (e - ay) - de * (n - ax)) / length if length > 0.0 else 0.0
+
+
+@inner
+def observe_own(w, o, task, north, east, heading, u, v, r, leg, obs):
+    """Own part of the observation, from the position, heading, speeds and active leg that the caller believes in."""
+    j = w.observer[o]
+    route = w.routes
+    obs[0] = clip(u / task.max_speed, -1.0, 1.0)
+    obs[1] = clip(v / task.max_speed, -1.0, 1.0)
+    obs[2] = clip(r / task.rate_scale, -1.0, 1.0)
+    count = route.count[j]
+    for i in range(3, N_OWN):
+        obs[i] = 0.0
+    obs[4] = obs[8] = obs[10] = 1.0
+    if count == 0:
+        return
+    k = min(leg, count - 1)
+    wn, we = route.waypoint[j, k, 0], route.waypoint[j, k, 1]
+    dn, de = wn - north, we - east
+    bearing = atan2(de, dn)
+    course = bearing
+    if k > 0:
+        an, ae = route.waypoint[j, k - 1, 0], route.waypoint[j, k - 1, 1]
+        if an != wn or ae != we:
+            course = atan2(we - ae, wn - an)
+            obs[5] = clip(cross_track_error(an, ae, wn, we, north, east) / task.cross_track_scale, -1.0, 1.0)
+    obs[3], obs[4] = sincos(course - heading)
+    obs[6] = clip(math.hypot(dn, de) / task.distance_scale, 0.0, 1.0)
+    obs[7], obs[8] = sincos(bearing - heading)
+    if k + 1 < count:
+        following = atan2(route.waypoint[j, k + 1, 1] - we, route.waypoint[j, k + 1, 0] - wn)
+        obs[9], obs[10] = sincos(following - course)
+    else:
+        obs[11] = 1.0
+
+
+@inner
+def _target(task, out, dn, de, vn, ve, heading_s, heading_c, known, radius, spread, vessel):
+    """One target's features, turned into {b}."""
+    out[0] = 1.0
+    out[1] = clip((heading_c * dn + heading_s * de) / task.range_scale, -1.0, 1.0)
+    out[2] = clip((heading_c * de - heading_s * dn) / task.range_scale, -1.0, 1.0)
+    if known:
+        out[3] = clip((heading_c * vn + heading_s * ve) / task.target_speed_scale, -1.0, 1.0)
+        out[4] = clip((heading_c * ve - heading_s * vn) / task.target_speed_scale, -1.0, 1.0)
+        out[5] = 1.0
+    else:
+        out[3] = out[4] = out[5] = 0.0
+    out[6] = clip(radius / task.radius_scale, 0.0, 1.0) if radius == radius else 0.0
+    out[7] = clip(spread, 0.0, 1.0)
+    out[8] = 1.0 if vessel else 0.0
+
+
+@inner
+def _keep_nearest(w, found, s, distance, keep):
+    """Insert source s into the ``keep`` nearest in w.order / w.ranges; returns how many there are now."""
+    w.ranges[s] = distance
+    k = found
+    while k > 0 and w.ranges[w.order[k - 1]] > distance:
+        if k < keep:
+            w.order[k] = w.order[k - 1]
+        k -= 1
+    if k < keep:
+        w.order[k] = s
+        return min(found + 1, keep)
+    return found
+
+
+@inner
+def observe(w, o, task, obs):
+    """Write the flat observation of observer o into obs [size], float32."""
+    nav, pic = w.nav, w.picture
+    own = w.observer[o]
+    V = w.vessels.active.shape[0]
+    S = pic.id.shape[1]
+    truth = task.observation == OBS_TRUTH
+    if truth:
+        north, east, heading = w.vessels.eta[own, 0], w.vessels.eta[own, 1], w.vessels.eta[own, 2]
+        observe_own(w, o, task, north, east, heading, w.vessels.nu[own, 0], w.vessels.nu[own, 1], w.vessels.nu[own, 2],
+                    w.routes.leg[own], obs)  # fmt: skip
+    else:
+        age = (w.tick * w.dt_us - nav.gnss_stamp_us[o]) * 1.0e-6
+        heading = nav.mru_heading[o]
+        cs, cc = sincos(nav.course[o])
+        north = nav.position[o, 0] + nav.sog[o] * cc * age
+        east = nav.position[o, 1] + nav.sog[o] * cs * age
+        observe_own(w, o, task, north, east, heading, nav.water_speed[o, 0], nav.water_speed[o, 1], nav.yaw_rate[o],
+                    nav.leg[o], obs)  # fmt: skip
+    sectors = task.observation == OBS_SECTORS
+    if sectors:
+        for i in range(N_OWN, task.size):
+            obs[i] = 0.0
+    hs, hc = sincos(heading)
+    lag = (w.tick - pic.tick[o]) * w.dt
+    found = 0
+    for s in range(S):
+        if task.observation == OBS_TRACKS or sectors:
+            if pic.id[o, s] == 0:
+                continue
+            dn, de = pic.position[o, s, 0] - north, pic.position[o, s, 1] - east
+            radius = pic.radius[o, s] if pic.radius[o, s] == pic.radius[o, s] else 0.0
+            if pic.motion_known[o, s]:
+                ts, tc = sincos(pic.cog[o, s])
+                dn += pic.sog[o, s] * tc * lag
+                de += pic.sog[o, s] * ts * lag
+        elif task.observation == OBS_AIS:
+            if w.ais.inbox_stamp_us[o, s] < 0:
+                continue
+            dn, de = w.ais.inbox[o, s, 0] - north, w.ais.inbox[o, s, 1] - east
+            radius = 0.0
+        else:
+            active = w.vessels.active[s] if s < V else w.obstacles.active[s - V]
+            if active == 0 or s == own:
+                continue
+            if s < V:
+                dn, de = w.vessels.eta[s, 0] - north, w.vessels.eta[s, 1] - east
+                radius = 0.5 * max(w.vessels.length[s], w.vessels.beam[s])
+            else:
+                dn, de = w.obstacles.position[s - V, 0] - north, w.obstacles.position[s - V, 1] - east
+                radius = w.obstacles.radius[s - V]
+        distance = math.hypot(dn, de)
+        if sectors:
+            _shade_sectors(task, obs, wrap(atan2(de, dn) - heading), distance, radius)
+        else:
+            found = _keep_nearest(w, found, s, distance - radius, task.targets)
+    if sectors:
+        return
+    for i in range(task.targets):
+        out = obs[N_OWN + i * N_TARGET : N_OWN + (i + 1) * N_TARGET]
+        if i >= found:
+            for f in range(N_TARGET):
+                out[f] = 0.0
+            continue
+        s = w.order[i]
+        if task.observation == OBS_TRACKS:
+            vn = ve = 0.0
+            if pic.motion_known[o, s]:
+                ts, tc = sincos(pic.cog[o, s])
+                vn, ve = pic.sog[o, s] * tc, pic.sog[o, s] * ts
+            _target(task, out, pic.position[o, s, 0] + vn * lag - north, pic.position[o, s, 1] + ve * lag - east, vn, ve,
+                    hs, hc, pic.motion_known[o, s], pic.radius[o, s],
+                    math.sqrt(0.5 * (pic.covariance[o, s, 0] + pic.covariance[o, s, 2])) / task.radius_scale,
+                    pic.descriptor[o, s] == DESCRIPTOR_VESSEL)  # fmt: skip
+        elif task.observation == OBS_AIS:
+            box = w.ais.inbox[o, s]
+            vn = ve = 0.0
+            known = box[4] == box[4]
+            if known:
+                ts, tc = sincos(box[2])
+                vn, ve = box[4] * tc, box[4] * ts
+            age = (w.tick * w.dt_us - w.ais.inbox_stamp_us[o, s]) * 1.0e-6
+            _target(task, out, box[0] - north, box[1] - east, vn, ve, hs, hc, known, 0.0, age / 60.0, s < V)
+        elif s < V:
+            _target(task, out, w.vessels.eta[s, 0] - north, w.vessels.eta[s, 1] - east, w.vessels.velocity[s, 0],
+                    w.vessels.velocity[s, 1], hs, hc, True, 0.5 * max(w.vessels.length[s], w.vessels.beam[s]), 0.0,
+                    True)  # fmt: skip
+        else:
+            i_m = s - V
+            _target(task, out, w.obstacles.position[i_m, 0] - north, w.obstacles.position[i_m, 1] - east,
+                    w.obstacles.velocity[i_m, 0], w.obstacles.velocity[i_m, 1], hs, hc, True, w.obstacles.radius[i_m], 0.0,
+                    False)  # fmt: skip
+
+
+@inner
+def _shade_sectors(task, obs, bearing, distance, radius):
+    """Closeness 1 - range / scale of a disc in every bearing sector that it touches; sector 0 starts at the bow."""
+    n = task.sectors
+    width = TWO_PI / n
+    half = PI if distance <= radius else math.asin(radius / distance)
+    closeness = clip(1.0 - max(distance - radius, 0.0) / task.range_scale, 0.0, 1.0)
+    first = int(math.floor((bearing - half) / width))
+    last = int(math.floor((bearing + half) / width))
+    for i in range(first, min(last, first + n - 1) + 1):
+        at = N_OWN + (i + 10 * n) % n
+        obs[at] = max(obs[at], closeness)

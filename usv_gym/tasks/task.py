@@ -1,0 +1,225 @@
+"""What a controller may do, what it sees and what it is paid for: the part of an environment that is not the sea.
+
+``TaskConfig`` is what a user writes; ``task_record`` turns it and a vessel into the flat record that the kernel reads.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from ..world.state import A
+
+ActionName = Literal["default", "throttle_nozzle", "thrusters", "actuators", "heading_speed", "discrete"]
+ObservationName = Literal["tracks", "ais", "sectors", "truth"]
+
+ACTION_DEMAND, ACTION_CHANNELS, ACTION_HEADING_SPEED, ACTION_DISCRETE = 0, 1, 2, 3
+OBS_TRACKS, OBS_AIS, OBS_SECTORS, OBS_TRUTH = 0, 1, 2, 3
+_OBSERVATIONS = {"tracks": OBS_TRACKS, "ais": OBS_AIS, "sectors": OBS_SECTORS, "truth": OBS_TRUTH}
+
+#: what every observation says of the own ship: (name, unit it is divided by, bounds)
+OWN_FEATURES = (
+    ("surge speed", "max speed"), ("sway speed", "max speed"), ("yaw rate", "rate scale"),
+    ("sin of (course of active leg - heading)", "1"), ("cos of the same", "1"),
+    ("cross-track error, + to starboard of the leg", "cross-track scale"),
+    ("distance to the active waypoint", "distance scale"),
+    ("sin of relative bearing of the active waypoint", "1"), ("cos of the same", "1"),
+    ("sin of the next turn", "1"), ("cos of the same", "1"),
+    ("active waypoint is the last (0 or 1)", "1"),
+)  # fmt: skip
+#: what ``tracks``, ``ais`` and ``truth`` say of each target, nearest first; zeros where the mask is 0
+TARGET_FEATURES = (
+    ("mask: 1 where there is a target", "1"),
+    ("position ahead, {b}", "range scale"), ("position to starboard, {b}", "range scale"),
+    ("velocity over ground ahead, {b}", "target speed scale"), ("velocity over ground to starboard, {b}", "target speed scale"),
+    ("motion is known (0 or 1)", "1"),
+    ("apparent radius", "radius scale"),
+    ("position standard deviation (age of the report for ``ais``)", "radius scale (60 s)"),
+    ("is a vessel (0 or 1)", "1"),
+)  # fmt: skip
+N_OWN, N_TARGET = len(OWN_FEATURES), len(TARGET_FEATURES)
+
+TERMS = ("progress", "cross_track", "proximity", "effort", "time", "collision", "arrival", "out_of_area")
+N_TERMS = len(TERMS)
+
+#: effects of the actions of ``discrete``: change of heading [deg], of speed [share of max speed]
+DISCRETE = ((0.0, 0.0), (-15.0, 0.0), (15.0, 0.0), (0.0, 0.125), (0.0, -0.125))
+HEADING_SPAN = np.pi / 2.0  #: [rad] heading change that +-1 of ``heading_speed`` asks for
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class RewardWeights(_Frozen):
+    """Weights of the reward terms; each term itself is a metric and stands in ``info["reward_terms"]`` unweighted."""
+
+    progress: float = 1.0  #: distance made good along the route in the step / distance at max speed
+    cross_track: float = 0.1  #: -min(1, |cross-track error| / scale)
+    proximity: float = 1.0  #: -(1 - closest / safe distance)^2 inside the safe distance, else 0
+    effort: float = 0.02  #: -mean squared change of the action
+    time: float = 0.05  #: -1 each step
+    collision: float = 50.0  #: -1 on contact
+    arrival: float = 20.0  #: +1 when the last waypoint is reached
+    out_of_area: float = 20.0  #: -1 when the area is left
+
+
+class TaskConfig(_Frozen):
+    """The decision problem of an environment."""
+
+    action: ActionName = "default"
+    observation: ObservationName = "tracks"
+    targets: int = Field(8, ge=1, le=64)  #: K nearest targets in the observation
+    sectors: int = Field(24, ge=4, le=360)  #: bearing sectors of ``sectors``
+    flat: bool = True  #: False: a Dict space of own, targets and mask (or sectors)
+    range_scale: float = Field(1852.0, gt=0)  #: [m]
+    distance_scale: float = Field(1000.0, gt=0)  #: [m]
+    cross_track_scale: float = Field(100.0, gt=0)  #: [m]
+    target_speed_scale: float = Field(10.0, gt=0)  #: [m/s]
+    radius_scale: float = Field(100.0, gt=0)  #: [m]
+    rate_scale: float = Field(0.5, gt=0)  #: [rad/s]
+    safe_distance: float = Field(50.0, gt=0)  #: [m] hull to hull, where the proximity term begins
+    reward: RewardWeights = RewardWeights()
+    end_on_collision: bool = True
+    end_on_arrival: bool = True
+    end_out_of_area: bool = True
+
+
+@dataclass(frozen=True)
+class Vessel:
+    """What a task needs to know of the controlled vessel."""
+
+    default_action: str
+    max_speed: float  # [m/s]
+    thrusters: int
+    has_nozzle: tuple[bool, ...]
+    has_bucket: tuple[bool, ...]
+
+
+@functools.cache
+def task_dtype() -> np.dtype[Any]:
+    """dtype of the task record that the kernel reads."""
+    return np.dtype([
+        ("action", "i1"), ("channels", "i2"), ("thruster", "i2", (3 * A,)), ("part", "i2", (3 * A,)),
+        ("observation", "i1"), ("targets", "i2"), ("sectors", "i2"), ("size", "i4"),
+        ("control_ticks", "i8"), ("max_steps", "i8"), ("max_speed", "f8"),
+        ("range_scale", "f8"), ("distance_scale", "f8"), ("cross_track_scale", "f8"), ("target_speed_scale", "f8"),
+        ("radius_scale", "f8"), ("rate_scale", "f8"), ("safe_distance", "f8"),
+        ("weight", "f8", (N_TERMS,)),
+        ("end_on_collision", "i1"), ("end_on_arrival", "i1"), ("end_out_of_area", "i1"),
+    ], align=True)  # fmt: skip
+
+
+@functools.cache
+def episode_dtype() -> np.dtype[Any]:
+    """dtype of what a task remembers of a running episode, one per world."""
+    return np.dtype([
+        ("step", "i8"), ("to_go", "f8"),  # steps so far; distance to go along the route [m]
+        ("heading_ref", "f8"), ("speed_ref", "f8"),  # of heading_speed and discrete
+        ("last_action", "f8", (3 * A,)),
+        ("closest", "f8"),  # smallest hull distance to anything since reset [m]
+        ("outcome", "i1"),  # 0 running, 1 collision, 2 arrival, 3 out of area, 4 time limit
+    ], align=True)  # fmt: skip
+
+
+OUTCOMES = ("running", "collision", "arrival", "out_of_area", "time_limit")
+
+
+def action_channels(name: str, vessel: Vessel) -> list[tuple[int, int]]:
+    """(thruster, part) of every channel of an action; part 0 rpm, 1 nozzle, 2 bucket."""
+    channels: list[tuple[int, int]] = []
+    for a in range(vessel.thrusters):
+        channels.append((a, 0))
+        if name == "actuators":
+            if vessel.has_nozzle[a]:
+                channels.append((a, 1))
+            if vessel.has_bucket[a]:
+                channels.append((a, 2))
+    return channels
+
+
+def resolve_action(config: TaskConfig, vessel: Vessel) -> str:
+    """The action's name, with ``default`` replaced by the vessel's own."""
+    return vessel.default_action if config.action == "default" else config.action
+
+
+def task_record(config: TaskConfig, vessel: Vessel, control_ticks: int, max_steps: int) -> NDArray[Any]:
+    """The record [1] of a task for a vessel; control_ticks ticks per step, max_steps steps per episode (0: no limit)."""
+    task = np.zeros(1, task_dtype())
+    name = resolve_action(config, vessel)
+    row = task[0]
+    if name in ("thrusters", "actuators"):
+        row["action"] = ACTION_CHANNELS
+        channels = action_channels(name, vessel)
+        row["channels"] = len(channels)
+        for c, (thruster, part) in enumerate(channels):
+            row["thruster"][c] = thruster
+            row["part"][c] = part
+    else:
+        row["action"] = {
+            "throttle_nozzle": ACTION_DEMAND, "heading_speed": ACTION_HEADING_SPEED, "discrete": ACTION_DISCRETE
+        }[name]  # fmt: skip
+        row["channels"] = 1 if name == "discrete" else 2
+    row["observation"] = _OBSERVATIONS[config.observation]
+    row["size"] = observation_size(config)
+    row["control_ticks"] = control_ticks
+    row["max_steps"] = max_steps
+    row["max_speed"] = vessel.max_speed
+    for field in ("targets", "sectors", "range_scale", "distance_scale", "cross_track_scale", "target_speed_scale",
+                  "radius_scale", "rate_scale", "safe_distance", "end_on_collision", "end_on_arrival",
+                  "end_out_of_area"):  # fmt: skip
+        row[field] = getattr(config, field)
+    row["weight"] = [getattr(config.reward, name) for name in TERMS]
+    return task
+
+
+def observation_size(config: TaskConfig) -> int:
+    """Length of the flat observation."""
+    return N_OWN + (config.sectors if config.observation == "sectors" else config.targets * N_TARGET)
+
+
+def action_space(config: TaskConfig, vessel: Vessel) -> gym.Space[Any]:
+    """Box in [-1, 1] of the named action's channels, or Discrete(5)."""
+    name = resolve_action(config, vessel)
+    if name == "discrete":
+        return gym.spaces.Discrete(len(DISCRETE))
+    n = len(action_channels(name, vessel)) if name in ("thrusters", "actuators") else 2
+    return gym.spaces.Box(-1.0, 1.0, (n,), np.float32)
+
+
+def observation_space(config: TaskConfig) -> gym.Space[Any]:
+    """Flat Box, or a Dict of ``own`` and ``targets`` with ``mask`` (or ``sectors``)."""
+    low = np.full(observation_size(config), -1.0, np.float32)
+    high = np.ones(observation_size(config), np.float32)
+    zero_to_one = (6, 11)
+    low[list(zero_to_one)] = 0.0
+    if config.observation == "sectors":
+        low[N_OWN:] = 0.0
+    else:
+        grid = low[N_OWN:].reshape(config.targets, N_TARGET)
+        grid[:, [0, 5, 6, 7, 8]] = 0.0
+    if config.flat:
+        return gym.spaces.Box(low, high, dtype=np.float32)
+    spaces: dict[str, gym.Space[Any]] = {"own": gym.spaces.Box(low[:N_OWN], high[:N_OWN], dtype=np.float32)}
+    if config.observation == "sectors":
+        spaces["sectors"] = gym.spaces.Box(low[N_OWN:], high[N_OWN:], dtype=np.float32)
+    else:
+        shape = (config.targets, N_TARGET)
+        spaces["targets"] = gym.spaces.Box(low[N_OWN:].reshape(shape), high[N_OWN:].reshape(shape), dtype=np.float32)
+        spaces["mask"] = gym.spaces.MultiBinary(config.targets)
+    return gym.spaces.Dict(spaces)
+
+
+def unflatten(config: TaskConfig, flat: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+    """The Dict form of flat observations [..., n]."""
+    own, rest = flat[..., :N_OWN].copy(), flat[..., N_OWN:]
+    if config.observation == "sectors":
+        return {"own": own, "sectors": rest.copy()}
+    targets = rest.reshape(*rest.shape[:-1], config.targets, N_TARGET).copy()
+    return {"own": own, "targets": targets, "mask": targets[..., 0].astype(np.int8)}

@@ -1,0 +1,314 @@
+"""Vessel files: what a 3-DOF plant is made of, read from ``configs/vessels`` and written into a world record."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from ..resources import shipped
+from ..units import DEG
+from .state import A
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Preset = Literal["standard", "original"]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Mass(_Model):
+    """Rigid body about the origin of {b}, and added mass (positive, as it adds up)."""
+
+    mass_kg: Positive
+    centre_of_gravity_x_m: float = 0.0
+    inertia_z_kg_m2: Positive
+    added_surge_kg: NonNegative = 0.0
+    added_sway_kg: NonNegative = 0.0
+    added_sway_from_yaw_kg_m: float = 0.0
+    added_yaw_from_sway_kg_m: float = 0.0
+    added_yaw_kg_m2: NonNegative = 0.0
+
+    @model_validator(mode="after")
+    def _positive_definite(self) -> Mass:
+        m = self.matrix()
+        if m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1] <= 0.0:
+            raise ValueError("the mass matrix must be positive definite; check centre_of_gravity_x_m and inertia_z_kg_m2")
+        return self
+
+    def matrix(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Inertia matrix M [3, 3], rigid body and added mass."""
+        static_moment = self.mass_kg * self.centre_of_gravity_x_m
+        return np.array([
+            [self.mass_kg + self.added_surge_kg, 0.0, 0.0],
+            [0.0, self.mass_kg + self.added_sway_kg, static_moment + self.added_sway_from_yaw_kg_m],
+            [0.0, static_moment + self.added_yaw_from_sway_kg_m, self.inertia_z_kg_m2 + self.added_yaw_kg_m2],
+        ])
+
+
+class Coriolis(_Model):
+    """``full``: from the mass matrix.  ``linearised``: -sway_kg u r in sway, nothing else."""
+
+    form: Literal["full", "linearised"]
+    sway_kg: float = 0.0
+
+
+class Damping(_Model):
+    """Hydrodynamic derivatives in SI units: force = derivative * motion, so drag is negative."""
+
+    Xu: float = 0.0
+    Xuu: float = 0.0
+    Xuuu: float = 0.0
+    Xuu_ittc: float = 0.0
+    Yv: float = 0.0
+    Yr: float = 0.0
+    Yvv: float = 0.0
+    Yrv: float = 0.0
+    Yvr: float = 0.0
+    Yrr: float = 0.0
+    Yvvv: float = 0.0
+    Nv: float = 0.0
+    Nr: float = 0.0
+    Nvv: float = 0.0
+    Nrv: float = 0.0
+    Nvr: float = 0.0
+    Nrr: float = 0.0
+    Nrrr: float = 0.0
+
+
+class Crossflow(_Model):
+    """Cross-flow drag of the strips from ``from_x_m`` to ``to_x_m``."""
+
+    drag_coefficient: NonNegative
+    draught_m: Positive
+    from_x_m: float
+    to_x_m: float
+    sway_factor: NonNegative = 1.0
+    yaw_factor: NonNegative = 1.0
+
+
+class Wind(_Model):
+    """Wind load in Blendermann's form."""
+
+    frontal_area_m2: NonNegative
+    lateral_area_m2: NonNegative
+    lateral_centroid_x_m: float
+    drag_bow: Positive
+    drag_stern: Positive
+    drag_side: Positive
+    cross_force: NonNegative
+
+
+class Waves(_Model):
+    """Gain of the wave-force filter per metre of significant height."""
+
+    surge_N_per_m: NonNegative
+    sway_N_per_m: NonNegative
+    yaw_Nm_per_m: NonNegative
+
+
+class Transfer(_Model):
+    """Denominator without its leading 1, and numerator, highest power first."""
+
+    denominator: tuple[float, ...] = Field(min_length=2, max_length=4)
+    numerator: tuple[float, ...] = Field(min_length=2, max_length=4)
+
+
+class FluidMemory(_Model):
+    """Radiation forces as transfer functions of velocity through the water."""
+
+    force_scale: float
+    moment_scale: float
+    sway: Transfer
+    yaw: Transfer
+    coupling: Transfer
+
+
+class Thruster(_Model):
+    """A propeller, bow thruster or waterjet; mixing gives its share of the demands (surge, yaw)."""
+
+    name: str
+    x_m: float
+    y_m: float
+    direction_deg: float = 0.0
+    gain_ahead_N_per_rpm2: Positive
+    gain_astern_N_per_rpm2: Positive
+    rpm_idle: float = 0.0
+    rpm_max: Positive
+    rpm_min: float
+    rpm_lag_s: NonNegative
+    nozzle_max_deg: NonNegative = 0.0
+    nozzle_lag_s: NonNegative = 0.0
+    bucket: bool = False
+    bucket_lag_s: NonNegative = 0.0
+    mix_surge: float = 0.0
+    mix_yaw: float = 0.0
+    mix_nozzle: float = 0.0
+
+
+class Autopilot(_Model):
+    """Gains of ``world/autopilot.py``."""
+
+    heading_gain: Positive
+    rate_gain: Positive
+    rate_integral: NonNegative
+    rate_max_deg_s: Positive
+    speed_gain: Positive
+    speed_integral: NonNegative
+    speed_curve_exponent: Positive
+
+
+class VesselModel(_Model):
+    """A vessel file.  Lengths in metres, speeds in metres per second, body axes forward and starboard."""
+
+    name: str
+    description: str
+    source: str
+    length: Positive
+    beam: Positive
+    length_pp: Positive
+    default_action: Literal["throttle_nozzle", "thrusters"]
+    cruise_speed: Positive
+    max_speed: Positive
+    mass: Mass
+    coriolis: Coriolis
+    damping: Damping
+    crossflow: Crossflow
+    wind: Wind
+    waves: Waves
+    thrusters: tuple[Thruster, ...] = Field(min_length=1, max_length=A)
+    reverse_by_bucket: bool = False
+    autopilot: Autopilot
+    fluid_memory: FluidMemory | None = None
+
+
+def load_vessel(name_or_path: str | Path) -> VesselModel:
+    """Read a vessel by the name of a shipped file (``"odin"``) or by path.
+
+    Raises
+    ------
+    ValueError
+        (``ConfigError``) in one line: the file, the key path, what was expected and the nearest known name.
+    """
+    known = shipped("vessels")
+    path = known.get(str(name_or_path), Path(name_or_path))
+    if not path.is_file():
+        raise _error(f"vessel {str(name_or_path)!r}: not a file and not one of {', '.join(known)}"
+                     + _suggest(str(name_or_path), list(known)))  # fmt: skip
+    try:
+        return VesselModel.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    except yaml.YAMLError as e:
+        raise _error(f"{path}: not valid YAML: {' '.join(str(e).split())}") from None
+    except ValidationError as e:
+        raise _error("; ".join(f"{path}: {line}" for line in _lines(e))) from None
+
+
+def _lines(error: ValidationError) -> Iterator[str]:
+    for item in error.errors():
+        key = ".".join(str(part) for part in item["loc"]) or "(file)"
+        hint = ""
+        if item["type"] == "extra_forbidden":
+            hint = _suggest(str(item["loc"][-1]), _fields(item["loc"][:-1]))
+        given = item["input"]
+        shown = f", got {given!r}" if isinstance(given, str | int | float | bool) else ""
+        yield f"{key}: {item['msg']}{shown}{hint}"
+
+
+def _fields(path: tuple[int | str, ...]) -> list[str]:
+    """Names that are allowed at a key path of a vessel file."""
+    model: Any = VesselModel
+    for part in path:
+        if isinstance(part, int):
+            continue
+        annotation = model.model_fields[part].annotation
+        inner = [t for t in getattr(annotation, "__args__", ()) if hasattr(t, "model_fields")]
+        model = inner[0] if inner else annotation
+    return list(model.model_fields)
+
+
+def _suggest(word: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(word, known, n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def _error(message: str) -> ValueError:
+    try:
+        from ..config import ConfigError
+    except ImportError:
+        return ValueError(message)
+    return ConfigError(message)  # type: ignore[no-any-return]
+
+
+def write_plant(
+    model: VesselModel,
+    worlds: np.ndarray[Any, Any],
+    b: int,
+    p: int,
+    preset: Preset = "standard",
+    memory: bool = False,
+) -> None:
+    """Fill row p of the plants group of ``worlds[b]``: parameters from the model, state at rest with engines idling.
+
+    ``original`` restores the quirks of the simulator of 2017: no cross-flow drag below 0.05 m/s of sway, the bucket left
+    out of the yaw moment, actuators stepped per message, longitudinal wind load A_L / A_F too large, heading integrated
+    2.5 % fast, and a current that turns with the vessel within a step.  ``memory`` switches the fluid memory on.
+    """
+    if memory and model.fluid_memory is None:
+        raise _error(f"vessel {model.name}: has no fluid_memory")
+    original = preset == "original"
+    q = worlds["plants"][b]
+    for field in q.dtype.names:
+        q[field][p] = 0
+    values: dict[str, Any] = dict(model.damping)
+    m = model.mass.matrix()
+    values |= {"m11": m[0, 0], "m22": m[1, 1], "m23": m[1, 2], "m32": m[2, 1], "m33": m[2, 2]}
+    values |= {"coriolis_full": model.coriolis.form == "full", "c26": model.coriolis.sway_kg}
+    flow, wind, waves, pilot = model.crossflow, model.wind, model.waves, model.autopilot
+    values |= {
+        "cd2d": flow.drag_coefficient, "draught": flow.draught_m, "strip_x0": flow.from_x_m, "strip_x1": flow.to_x_m,
+        "crossflow_sway": flow.sway_factor, "crossflow_yaw": flow.yaw_factor,
+        "crossflow_dead_zone": 0.05 if original else 0.0,
+        "length_pp": model.length_pp,
+        "area_front": wind.frontal_area_m2, "area_side": wind.lateral_area_m2, "wind_arm": wind.lateral_centroid_x_m,
+        "cd_t": wind.drag_side, "cd_l_bow": wind.drag_bow, "cd_l_stern": wind.drag_stern,
+        "wind_delta": wind.cross_force,
+        "wind_surge_factor": 1.0 if original or not wind.lateral_area_m2 else wind.frontal_area_m2 / wind.lateral_area_m2,
+        "wave_gain": (waves.surge_N_per_m, waves.sway_N_per_m, waves.yaw_Nm_per_m),
+        "current_turns": not original,
+        "yaw_gain": 1.025 if original else 1.0,
+        "bucket_in_yaw": not original,
+        "euler_actuators": original,
+        "reverse_by_bucket": model.reverse_by_bucket,
+        "ap_heading": (pilot.heading_gain, pilot.rate_gain, pilot.rate_integral),
+        "ap_speed": (pilot.speed_gain, pilot.speed_integral, pilot.speed_curve_exponent),
+        "ap_speed_max": model.max_speed, "ap_rate_max": pilot.rate_max_deg_s * DEG,
+        "thrusters": len(model.thrusters),
+    }  # fmt: skip
+    for field, value in values.items():
+        q[field][p] = value
+    for i, t in enumerate(model.thrusters):
+        per_thruster = {
+            "x": t.x_m, "y": t.y_m, "direction": t.direction_deg * DEG,
+            "gain_ahead": t.gain_ahead_N_per_rpm2, "gain_astern": t.gain_astern_N_per_rpm2,
+            "n_idle": t.rpm_idle, "n_max": t.rpm_max, "n_min": t.rpm_min, "n_lag": t.rpm_lag_s, "n": t.rpm_idle,
+            "nozzle_max": t.nozzle_max_deg * DEG, "nozzle_lag": t.nozzle_lag_s,
+            "bucket": t.bucket, "bucket_lag": t.bucket_lag_s,
+            "mix_surge": t.mix_surge, "mix_yaw": t.mix_yaw, "mix_nozzle": t.mix_nozzle,
+            "thrust_left": 1.0,
+        }  # fmt: skip
+        for field, value in per_thruster.items():
+            q[field][p, i] = value
+    if memory and model.fluid_memory is not None:
+        fluid = model.fluid_memory
+        q["memory"][p] = 1
+        q["memory_scale"][p] = fluid.force_scale, fluid.moment_scale
+        for i, pair in enumerate((fluid.sway, fluid.yaw, fluid.coupling)):
+            q["memory_den"][p, i, : len(pair.denominator)] = pair.denominator
+            q["memory_num"][p, i, : len(pair.numerator)] = pair.numerator
