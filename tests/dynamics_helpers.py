@@ -1,7 +1,11 @@
-"""Kernels and loops that tests and ``tests/make_golden.py`` drive the own-ship physics with, without an env."""
+"""Kernels and loops with which tests drive the own-ship physics, without an env.
+
+``python tests/dynamics_helpers.py`` writes the golden tables anew; review the diff.
+"""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +19,7 @@ from usv_gym.world.dynamics import plant_step
 from usv_gym.world.state import world_dtype
 from usv_gym.world.vessel import load_vessel, write_plant
 
+GOLDEN = Path(__file__).parent / "golden" / "steady_motion.json"
 RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "data" / "original"
 DTYPE = world_dtype(8, 16)
 
@@ -114,3 +119,34 @@ def thrust_log(name):
     """Command rows [rows, side, 3] of a log; sides starboard, port."""
     table = np.genfromtxt(RECORDINGS / name, delimiter=",")[:, :6] / 100.0
     return np.ascontiguousarray(table.reshape(-1, 2, 3)[:, ::-1])
+
+
+def steady_motion(vessel, preset="standard"):
+    """Table of steady [u m/s, v m/s, r deg/s] by surge and yaw demand in per cent."""
+    table = {}
+    for surge in (0, 25, 50, 75, 100, -50):
+        for yaw in (0, 10, 25, 50, 100):
+            worlds = make_world(vessel, preset)
+            demand(worlds, surge / 100, yaw / 100)
+            u, v, r = simulate(worlds, 200.0)[-1, 3:]
+            table[f"{surge} {yaw}"] = [round(float(x), 5) + 0.0 for x in (u, v, np.degrees(r))]
+    return table
+
+
+@kernel
+def demand(worlds, surge, yaw):
+    mix(worlds[0], 0, surge, yaw)
+
+
+def golden_tables():
+    return {
+        "odin": steady_motion("odin"),
+        "odin original": steady_motion("odin", "original"),
+        "jolner": steady_motion("jolner"),
+        "otter": steady_motion("otter"),
+    }
+
+
+if __name__ == "__main__":
+    GOLDEN.parent.mkdir(exist_ok=True)
+    GOLDEN.write_text(json.dumps(golden_tables(), indent=1) + "\n")

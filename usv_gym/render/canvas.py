@@ -50,8 +50,8 @@ def rgba(colour: str) -> RGBA | None:
 @functools.cache
 def font(size: int) -> Any:
     """The font that comes with pygame, so that pictures look the same on every machine."""
-    pg = load_pygame()
-    return pg.font.Font(None, size)
+    pg = load_pygame().font
+    return pg.Font(pg.get_default_font(), size)
 
 
 @functools.lru_cache(maxsize=2048)
@@ -89,6 +89,7 @@ class Canvas:
     """
 
     def __init__(self, size: tuple[int, int], palette: str, supersample: int = 2) -> None:
+        """Blank picture."""
         self.size, self.palette, self.ss = size, palette, supersample
         self.pg = load_pygame()
         self.surface = self.pg.Surface((size[0] * supersample, size[1] * supersample))
@@ -146,26 +147,23 @@ class Canvas:
             else:
                 self.pg.draw.circle(self.surface, colour[:3], (x, y), radius)
 
-    def merged(self, polygons: Sequence[Points], role: str) -> None:
-        """Translucent areas drawn as one, so that where they overlap is no darker."""
-        _, fill, _ = self.style(role)
-        shapes = [shape for shape in (clip(p, self._frame()) for p in polygons) if len(shape) > 2]
-        if fill is None or not shapes:
-            return
-        layer = self.pg.Surface(self.surface.get_size())
-        blank = (255 - fill[0], 0, 255)  # any colour but the shadows'
-        layer.fill(blank)
-        layer.set_colorkey(blank)
-        layer.set_alpha(fill[3])
-        for shape in shapes:
-            self.pg.draw.polygon(layer, fill[:3], (shape * self.ss).tolist())
-        self.surface.blit(layer, (0, 0))
+    def tint(self, points: Points, role: str) -> None:
+        """Fill an outline as if its translucent colour lay on the bare sea: where two overlap it is no darker."""
+        fill = self.style(role)[1]
+        if fill is not None:
+            self._fill(points, self._on_sea(fill))
 
     # --- text --------------------------------------------------------------------------------------------------------
     def text(
-        self, text: str, at: tuple[float, float], role: str = "text", size: int = 13, align: float = 0.0, halo: bool = False
+        self,
+        text: str,
+        at: tuple[float, float],
+        role: str = "text",
+        size: int = 13,
+        align: float = 0.0,
+        halo: bool = False,
     ) -> None:
-        """Text with its top left at ``at``; align 0.5 centres it and 1 ends it there.  The halo is the role's area colour."""
+        """Text with its top left at ``at``; align 0.5 centres it, 1 ends it there.  The halo is in the area colour."""
         style = STYLES[role]
         image = text_surface(text, size, style.line(self.palette), style.fill(self.palette) if halo else "")
         x = at[0] - align * (image.get_width() - (2 if halo else 0)) - (1 if halo else 0)
@@ -176,11 +174,20 @@ class Canvas:
         pg = self.pg
         out = self.surface if self.ss == 1 else pg.transform.smoothscale(self.surface, self.size)
         out.blits(self._text, doreturn=False)
-        return np.ascontiguousarray(pg.surfarray.pixels3d(out).swapaxes(0, 1))
+        pixels = np.frombuffer(pg.image.tobytes(out, "RGB"), dtype=np.uint8)
+        return pixels.reshape(self.size[1], self.size[0], 3).copy()  # writable, like any array of an environment
 
-    # --- the inner drawing ----------------------------------------------------------------------------------------------
+    # --- the inner drawing -----------------------------------------------------------------------------------------
     def _frame(self) -> tuple[float, float, float, float]:
         return -20.0, -20.0, self.size[0] + 20.0, self.size[1] + 20.0
+
+    def _on_sea(self, colour: RGBA) -> RGBA:
+        """Opaque colour of a translucent one over the bare sea."""
+        if colour[3] == 255:
+            return colour
+        sea, k = rgba(STYLES["sea"].fill(self.palette)) or colour, colour[3] / 255.0
+        r, g, b = (round(k * c + (1.0 - k) * s) for c, s in zip(colour[:3], sea[:3], strict=True))
+        return r, g, b, 255
 
     def _visible(self, points: Points) -> Points:
         x0, y0, x1, y1 = self._frame()
@@ -201,30 +208,24 @@ class Canvas:
             self.pg.draw.polygon(self.surface, colour[:3], corners)
 
     def _stroke(self, points: Points, colour: RGBA, style: Style) -> None:
-        """Lines of the style's width with round joints; those out of sight are left out."""
+        """Lines of the style's width with round joints."""
         x0, y0, x1, y1 = self._frame()
-        a, b = points[:-1], points[1:]
-        low, high = np.minimum(a, b), np.maximum(a, b)
-        seen = (high[:, 0] >= x0) & (low[:, 0] <= x1) & (high[:, 1] >= y0) & (low[:, 1] <= y1)
-        if not seen.any():
+        low, high = points.min(axis=0), points.max(axis=0)
+        if high[0] < x0 or low[0] > x1 or high[1] < y0 or low[1] > y1:
             return
         width = self._width(style)
-        if colour[3] < 255:  # thin decoration: blending it with the sea once is enough
-            sea = rgba(STYLES["sea"].fill(self.palette)) or colour
-            k = colour[3] / 255.0
-            colour = tuple(round(k * c + (1.0 - k) * s) for c, s in zip(colour[:3], sea[:3], strict=True)) + (255,)  # type: ignore[assignment]
+        colour = self._on_sea(colour)  # thin decoration needs no true blending
         if style.dash is not None:
             for p, q in dashes(points, *style.dash, (x0, y0, x1, y1)):
                 self.pg.draw.line(self.surface, colour[:3], p * self.ss, q * self.ss, width)
             return
-        for run in np.split(np.arange(len(seen)), np.flatnonzero(np.diff(seen)) + 1):
-            if not seen[run[0]]:
-                continue
-            path = (_thin(points[run[0] : run[-1] + 2]) * self.ss).tolist()
-            self.pg.draw.lines(self.surface, colour[:3], False, path, width)
-            if width > 2:
-                for p in path[1:-1]:
-                    self.pg.draw.circle(self.surface, colour[:3], p, 0.5 * width)
+        path = _thin(points) * self.ss
+        self.pg.draw.lines(self.surface, colour[:3], False, path.tolist(), width)
+        if width > 2:  # fill the notch on the outside of bends
+            a, b = np.diff(path[:-1], axis=0), np.diff(path[1:], axis=0)
+            bend = (a * b).sum(axis=1) < 0.96 * np.hypot(*a.T) * np.hypot(*b.T)
+            for p in path[1:-1][bend].tolist():
+                self.pg.draw.circle(self.surface, colour[:3], p, 0.5 * width)
 
     def _arrow(self, points: Points, colour: RGBA) -> Points:
         """Draw the head at the end of a line and return the line without it."""
@@ -236,7 +237,7 @@ class Canvas:
         along = (tip - back) / length
         across = np.array([-along[1], along[0]])
         base = tip - size * along
-        self._fill(np.array([tip, base + 0.38 * size * across, base - 0.38 * size * across]), colour[:3] + (255,))
+        self._fill(np.array([tip, base + 0.38 * size * across, base - 0.38 * size * across]), (*colour[:3], 255))
         return np.vstack((points[:-1], base))
 
 
@@ -260,7 +261,9 @@ def _thin(points: Points) -> Points:
     return points[keep]
 
 
-def dashes(points: Points, on: float, off: float, frame: tuple[float, float, float, float]) -> list[tuple[Points, Points]]:
+def dashes(
+    points: Points, on: float, off: float, frame: tuple[float, float, float, float]
+) -> list[tuple[Points, Points]]:
     """Pieces of a line that are drawn when ``on`` pixels are, then ``off`` are not; only those in the frame."""
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     starts = np.arange(0.0, along[-1], on + off)[:20000]

@@ -1,4 +1,4 @@
-"""Turns an instant of the sea into primitives: how each thing looks is decided here, once, for live frames and episodes."""
+"""Turns an instant of the sea into primitives: what each thing looks like is decided here, for frames and episodes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .primitives import LAYERS, Circle, Dots, Label, Panel, Points, Polygon, Pol
 from .sea import DESCRIPTORS, HULLS, OBSTACLES, Detection, Sea, Trail
 
 VECTOR_SECONDS = 60.0  #: a speed vector shows where a vessel is after this time
-HULL_PX, OWN_PX, OBSTACLE_PX, AIS_PX = 15.0, 24.0, 10.0, 17.0  #: smallest sizes on the picture
+HULL_PX, OWN_PX, OBSTACLE_PX, AIS_PX = 16.0, 24.0, 10.0, 14.0  #: smallest sizes on the picture
 
 Layers = dict[str, list[Primitive]]
 
@@ -71,7 +71,8 @@ def compose(
 
 def hull(sea: Sea, j: int) -> Points:
     """Outline of a vessel, to scale: [5, 2] clockwise from the bow."""
-    return shapes.placed(shapes.HULL, *sea.eta[j], sea.length[j], sea.beam[j])
+    north, east, psi = sea.eta[j]
+    return shapes.placed(shapes.HULL, north, east, psi, sea.length[j], sea.beam[j])
 
 
 def shadow_of(sea: Sea, source: int) -> Points | None:
@@ -93,18 +94,21 @@ def _rings(layers: Layers, sea: Sea, extent: tuple[float, float, float, float]) 
     """Range rings of the sensors, rings at round distances between, and bearings on the largest that is in view."""
     here, rings = sea.here, layers["rings"]
     view = 0.5 * min(extent[1] - extent[0], extent[3] - extent[2])
-    step = shapes.nice_step(view, 2.5)
-    reach = sea.radar_range if 0.0 < sea.radar_range < 2.0 * view else 3.0 * step
-    distances = [k * step for k in range(1, 4) if k * step < 0.97 * reach]
+    step = shapes.nice_step(view, 4.0)
+    count = math.floor(0.97 * view / step)  # rings that are in view all around
+    distances = [k * step for k in range(1, count + 1) if not 0.0 < sea.radar_range <= 1.03 * k * step]
     for r in distances:
         rings.append(Circle(here, r, "ring"))
         layers["labels"].append(_ring_label(here, r, f"{r:.0f} m"))
     if sea.lidar_range > 0.0:
         rings.append(Circle(here, sea.lidar_range, "ring_lidar"))
+        layers["labels"].append(
+            _ring_label(here, sea.lidar_range, f"LiDAR {sea.lidar_range:.0f} m", "label_lidar", 250.0)
+        )
     if sea.radar_range > 0.0:
         rings.append(Circle(here, sea.radar_range, "ring_radar"))
         layers["labels"].append(_ring_label(here, sea.radar_range, f"radar {sea.radar_range:.0f} m"))
-    compass = sea.radar_range if 0.0 < sea.radar_range <= view else 2.0 * step
+    compass = sea.radar_range if 0.0 < sea.radar_range <= view else count * step
     for degrees in range(0, 360, 10):
         b = degrees * DEG
         inward = (0.95 if degrees % 30 == 0 else 0.975) * compass
@@ -115,10 +119,13 @@ def _rings(layers: Layers, sea: Sea, extent: tuple[float, float, float, float]) 
             layers["labels"].append(Label((f"{degrees:03d}",), at, "label_ring", priority=-1.0, fixed=True))
 
 
-def _ring_label(here: tuple[float, float], r: float, text: str) -> Label:
-    b = 196.0 * DEG  # off the bearings that have numbers
+def _ring_label(
+    here: tuple[float, float], r: float, text: str, role: str = "label_ring", bearing: float = 195.0
+) -> Label:
+    """Text on a ring, by default off the bearings [deg] that have numbers."""
+    b = bearing * DEG
     at = (here[0] + r * math.cos(b), here[1] + r * math.sin(b))
-    return Label((text,), at, "label_ring", priority=-2.0, fixed=True)
+    return Label((text,), at, role, priority=-2.0, fixed=True)
 
 
 def _trail(layers: Layers, trail: Trail, own: bool) -> None:
@@ -164,7 +171,7 @@ def _obstacle(layer: list[Primitive], sea: Sea, source: int) -> None:
     def part(unit: Points, role: str, min_px: float) -> None:
         layer.append(_body(shapes.placed(unit, *at, 0.0, size), role, at, size, min_px))
 
-    disc = shapes.arc((0.0, 0.0), 0.5, 0.0, 2.0 * math.pi, 25)[:-1]
+    disc = 0.5 * shapes.CIRCLE
     if kind in ("iceberg", "islet", "lighthouse"):
         ground = "islet" if kind == "lighthouse" else kind
         rim, shade = shapes.crag(at, radius, m)
@@ -193,14 +200,15 @@ def _own(layer: list[Primitive], sea: Sea) -> None:
     """The own ship: heading line, speed vector, hull."""
     at, psi = sea.here, float(sea.eta[sea.own, 2])
     reach = max(float(np.hypot(*sea.velocity[sea.own])) * VECTOR_SECONDS, 6.0 * float(sea.length[sea.own]))
-    layer.append(Polyline(np.array([at, (at[0] + reach * math.cos(psi), at[1] + reach * math.sin(psi))]), "own_heading"))
+    ahead = (at[0] + reach * math.cos(psi), at[1] + reach * math.sin(psi))
+    layer.append(Polyline(np.array([at, ahead]), "own_heading"))
     _vector(layer, at, sea.velocity[sea.own], "own_vector")
     layer += _hull(sea, sea.own, "own_hull", "own_house", OWN_PX)
 
 
 def _hull(sea: Sea, j: int, role: str, house_role: str, min_px: float) -> list[Primitive]:
     at, length = sea.place(j), float(sea.length[j])
-    house = shapes.placed(shapes.DECKHOUSE, *sea.eta[j], length, sea.beam[j])
+    house = shapes.placed(shapes.DECKHOUSE, *at, sea.eta[j, 2], length, sea.beam[j])
     return [_body(hull(sea, j), role, at, length, min_px), _body(house, house_role, at, length, min_px)]
 
 
@@ -215,7 +223,7 @@ def _ais(layer: list[Primitive], at: tuple[float, float], heading: float) -> Non
 
 
 def _detection(layers: Layers, d: Detection) -> None:
-    """What the TDM reports: a disc of the apparent radius or an oblong along the course, and how sure it is of the place."""
+    """What the TDM reports: a disc of the apparent radius or an oblong along the course, and how sure it is of that."""
     layer = layers["detections"]
     nn, ne, ee = d.covariance
     if math.isfinite(d.radius):

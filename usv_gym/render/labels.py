@@ -18,7 +18,8 @@ Boxes = NDArray[np.float64]
 GAP = 3.0  #: [px] between an object and its label
 LEADER = 14.0  #: [px] a label further from its object than this gets a line to it
 #: right and left first, as people expect; then the corners, above and below (x, y), y down
-_DIRECTIONS = np.array([(math.cos(a), math.sin(a)) for a in np.radians([0, 180, 45, -45, 135, -135, 90, -90, 20, -20, 160, -160])])
+_ANGLES = np.radians([0, 180, 45, -45, 135, -135, 90, -90, 20, -20, 160, -160])
+_DIRECTIONS = np.column_stack((np.cos(_ANGLES), np.sin(_ANGLES)))
 _PREFERENCE = np.array([0.0, 1.5, 1.0, 1.0, 2.5, 2.5, 3.0, 3.0, 0.8, 0.8, 2.0, 2.0])
 _DISTANCES = np.array([0.0, 7.0, 16.0, 28.0, 44.0, 64.0, 90.0])
 
@@ -27,7 +28,8 @@ _DISTANCES = np.array([0.0, 7.0, 16.0, 28.0, 44.0, 64.0, 90.0])
 class Request:
     """A label to place: its size and the place it belongs to [px].
 
-    ``clearance`` is the radius of what is drawn at the anchor.  A ``fixed`` one is centred on its anchor or dropped.
+    ``clearance`` is the radius of what is drawn at the anchor.  A ``fixed`` one is centred on its anchor or dropped,
+    and covers nothing.
     """
 
     size: tuple[float, float]
@@ -45,7 +47,9 @@ class Placed:
     leader: tuple[tuple[float, float], tuple[float, float]] | None = None
 
 
-def place(requests: Sequence[Request], frame: Box, keep_out: Sequence[Box] = (), avoid: Sequence[Box] = ()) -> list[Placed | None]:
+def place(
+    requests: Sequence[Request], frame: Box, keep_out: Sequence[Box] = (), avoid: Sequence[Box] = ()
+) -> list[Placed | None]:
     """Place labels, highest priority first; equal ones in their order.
 
     Parameters
@@ -72,15 +76,15 @@ def place(requests: Sequence[Request], frame: Box, keep_out: Sequence[Box] = (),
         if not (frame[0] <= request.anchor[0] <= frame[2] and frame[1] <= request.anchor[1] <= frame[3]):
             continue  # what it belongs to is out of sight
         boxes, cost = _candidates(request)
-        inside = (
-            (boxes[:, 0] >= frame[0]) & (boxes[:, 1] >= frame[1]) & (boxes[:, 2] <= frame[2]) & (boxes[:, 3] <= frame[3])
-        )
+        inside = (boxes[:, :2] >= frame[:2]).all(axis=1) & (boxes[:, 2:] <= frame[2:]).all(axis=1)
         hard = np.array(taken, dtype=np.float64).reshape(-1, 4)
         free = inside & (_overlap(boxes, hard).sum(axis=1) == 0.0)
+        covered = _overlap(boxes, soft).sum(axis=1) / (request.size[0] * request.size[1])
+        if request.fixed:
+            free &= covered == 0.0
         if not free.any():
             continue
-        area = request.size[0] * request.size[1]
-        cost = np.where(free, cost + 60.0 * _overlap(boxes, soft).sum(axis=1) / area, np.inf)
+        cost = np.where(free, cost + 60.0 * covered, np.inf)
         best = int(cost.argmin())
         box: Box = tuple(float(x) for x in boxes[best])  # type: ignore[assignment]
         taken.append(box)

@@ -63,9 +63,7 @@ def gauges(sea: Sea) -> tuple[tuple[str, str], ...]:
     )
 
 
-def plots(
-    t: Points, speed: Points, heading: Points, closest: Points, marker: float | None = None
-) -> tuple[Plot, ...]:
+def plots(t: Points, speed: Points, heading: Points, closest: Points, marker: float | None = None) -> tuple[Plot, ...]:
     """Speed [kn], heading [deg] and range to the closest object [m] over time [s]; inputs are SI and radians, each [T].
 
     The values printed are those at ``marker``, or the last ones.

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 
 #: drawing order, bottom first; ``land`` waits for charts
-LAYERS = ("land", "shadows", "rings", "tracks", "route", "detections", "obstacles", "vessels", "symbols", "own", "labels")
+LAYERS = (
+    "shadows", "land", "rings", "tracks", "route", "detections", "obstacles", "vessels", "symbols", "own", "labels"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

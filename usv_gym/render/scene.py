@@ -13,7 +13,7 @@ from .primitives import Scene
 from .scene_episode import scene_from_episode
 from .sea import AisReport, Detection, History, Sea, sides
 
-__all__ = ["History", "Scene", "sea_from_record", "scene_from_episode", "scene_from_snapshot"]
+__all__ = ["History", "Scene", "scene_from_episode", "scene_from_snapshot", "sea_from_record"]
 
 
 def scene_from_snapshot(
@@ -119,7 +119,7 @@ def _reports(ais: Any, o: int) -> list[AisReport]:
     ]
 
 
-def _direction(ais: Any, s: int) -> float:
+def _direction(ais: Any, s: Any) -> float:
     heading = float(ais["heading"][s])
     return heading if np.isfinite(heading) else float(ais["cog"][s])
 

@@ -15,7 +15,7 @@ from .primitives import Circle, Dots, Label, Points, Polyline, Primitive, Scene
 from .sea import AisReport, Detection, Sea, Trail, sides
 
 MARKED = 4  #: this many closest approaches are marked
-NEAR = 1000.0  #: [m] objects that never came nearer do not widen the view
+NEAR = 400.0  #: [m] objects that never came nearer (or than the own track is long) do not widen the view
 HISTORY = 1500  #: past detections shown, at most
 STALE_REPORTS = 180.0  #: [s] an AIS symbol stays this long after its report (the slowest class A interval)
 
@@ -144,7 +144,9 @@ def _reports(table: Any, now: float) -> list[AisReport]:
     past = table[(table["t"] <= now) & (table["t"] >= now - STALE_REPORTS) & table["received"]]
     last = {int(r["source"]): r for r in past}
     return [
-        AisReport(s, (float(r["north"]), float(r["east"])), float(r["heading"] if np.isfinite(r["heading"]) else r["cog"]))
+        AisReport(
+            s, (float(r["north"]), float(r["east"])), float(r["heading"] if np.isfinite(r["heading"]) else r["cog"])
+        )
         for s, r in sorted(last.items())
     ]
 
@@ -156,13 +158,15 @@ def _trail(episode: Episode, j: int) -> Trail:
 
 def _hull_distances(episode: Episode) -> Points:
     """Distance from the own ship to every source [T, S]; infinite where there is none."""
-    d = np.where(episode.active & np.isfinite(episode.distance), episode.distance, np.inf).astype(np.float64)
+    known = episode.active & np.isfinite(episode.distance)
+    d: Points = np.where(known, episode.distance, np.inf).astype(np.float64)
     d[:, int(episode.meta["own"])] = np.inf
     return d
 
 
 def _nearest(episode: Episode) -> Points:
-    return _hull_distances(episode).min(axis=1, initial=np.inf)
+    nearest: Points = _hull_distances(episode).min(axis=1, initial=np.inf)
+    return nearest
 
 
 def _past(episode: Episode, now: float) -> list[Primitive]:
@@ -199,10 +203,12 @@ def _approaches(episode: Episode, marked: int) -> tuple[list[Primitive], list[Pr
 def _extent(episode: Episode, sea: Sea) -> tuple[float, float, float, float]:
     """Own track, route, and whatever came near, with a margin for labels."""
     points = [episode.eta[episode.active[:, sea.own], sea.own, :2], sea.route]
-    near = _hull_distances(episode).min(axis=0) < NEAR
-    for s in sea.others():
-        if near[s]:
-            points.append(np.array([sea.place(s)]))
+    span = float(np.ptp(np.vstack(points), axis=0).max())
+    distance, limit = _hull_distances(episode), max(NEAR, span)
+    for s in np.flatnonzero(distance.min(axis=0) < limit):
+        points.append(episode.position(int(s))[[distance[:, s].argmin()]])
+        if sea.distance[s] < limit:
+            points.append(np.array([sea.place(int(s))]))
     cloud = np.vstack(points)
     (south, west), (north, east) = cloud.min(axis=0), cloud.max(axis=0)
     margin = max(60.0, 0.07 * max(north - south, east - west))

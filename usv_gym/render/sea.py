@@ -143,14 +143,16 @@ class History:
     """
 
     def __init__(self, seconds: float = 120.0) -> None:
+        """Empty memory."""
         self.seconds = seconds
-        self._rows: deque[tuple[float, Points, Points, Points, float]] = deque()
+        self._rows: deque[tuple[float, Points, Points, NDArray[np.bool_], float]] = deque()
 
     def push(self, sea: Sea) -> None:
         """Remember an instant; one that is not later than the last starts a new memory (the world was reset)."""
         if self._rows and sea.t <= self._rows[-1][0]:
             self._rows.clear()
-        self._rows.append((sea.t, sea.eta.copy(), sea.velocity.copy(), sea.active[: sea.vessels].copy(), sea.closest()[0]))
+        active = sea.active[: sea.vessels].copy()
+        self._rows.append((sea.t, sea.eta.copy(), sea.velocity.copy(), active, sea.closest()[0]))
         while self._rows and self._rows[0][0] < sea.t - self.seconds:
             self._rows.popleft()
 
@@ -159,9 +161,7 @@ class History:
         if len(self._rows) < 2:
             return {}
         t, eta, active = self._column(0), self._column(1), self._column(3) != 0
-        return {
-            int(j): Trail(t[active[:, j]], eta[active[:, j], j]) for j in np.flatnonzero(active[-1]) if active[:, j].any()
-        }
+        return {int(j): Trail(t[active[:, j]], eta[active[:, j], j]) for j in np.flatnonzero(active[-1])}
 
     def curves(self, own: int) -> tuple[Points, Points, Points, Points]:
         """Times [s], speeds [m/s], headings [rad] and ranges to the closest [m] of the own ship, each [T]."""

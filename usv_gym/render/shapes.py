@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -20,43 +21,52 @@ def placed(unit: Points, north: float, east: float, psi: float, length: float, b
     """Outline given in units of (length, beam) {b}, scaled, turned by psi [rad] and moved to (north, east) [m]."""
     xy = unit * (length, length if beam is None else beam)
     s, c = math.sin(psi), math.cos(psi)
-    return xy @ np.array([(c, s), (-s, c)]) + (north, east)
+    out: Points = xy @ np.array([(c, s), (-s, c)]) + (north, east)
+    return out
 
 
 def arc(centre: tuple[float, float], radius: float, start: float, stop: float, n: int = 24) -> Points:
     """Points on a circle between two true bearings [rad]."""
     b = np.linspace(start, stop, n)
-    return np.column_stack((centre[0] + radius * np.cos(b), centre[1] + radius * np.sin(b)))
+    out: Points = np.column_stack((centre[0] + radius * np.cos(b), centre[1] + radius * np.sin(b)))
+    return out
 
 
-def ellipse(centre: tuple[float, float], semi_along: float, semi_across: float, psi: float, n: int = 40) -> Points:
+#: circle of radius 1, [40, 2]
+CIRCLE = arc((0.0, 0.0), 1.0, 0.0, 2.0 * math.pi, 41)[:-1]
+
+
+def ellipse(centre: tuple[float, float], semi_along: float, semi_across: float, psi: float) -> Points:
     """Ellipse with its first axis along the bearing psi [rad]."""
-    unit = arc((0.0, 0.0), 1.0, 0.0, 2.0 * math.pi, n)[:-1]
-    return placed(unit, *centre, psi, semi_along, semi_across)
+    return placed(CIRCLE, centre[0], centre[1], psi, semi_along, semi_across)
 
 
-def covariance_ellipse(
-    centre: tuple[float, float], nn: float, ne: float, ee: float, sigmas: float = 2.0, n: int = 40
-) -> Points:
+def covariance_ellipse(centre: tuple[float, float], nn: float, ne: float, ee: float, sigmas: float = 2.0) -> Points:
     """Contour of ``sigmas`` standard deviations of a position with covariance [[nn, ne], [ne, ee]] [m^2]."""
     values, vectors = np.linalg.eigh(np.array([(nn, ne), (ne, ee)]))
     major, minor = sigmas * np.sqrt(np.maximum(values[::-1], 0.0))
-    return ellipse(centre, float(major), float(minor), math.atan2(vectors[1, 1], vectors[0, 1]), n)
+    return ellipse(centre, float(major), float(minor), math.atan2(vectors[1, 1], vectors[0, 1]))
 
 
 def crag(centre: tuple[float, float], radius: float, index: int) -> tuple[Points, Points]:
-    """Irregular outline that lies in the disc of ``radius`` and touches it, and its shaded side; the same for an index."""
+    """Irregular outline in the disc of ``radius``, touching it, and its shaded side; always the same for an index."""
+    rim, shade = _crag(index)
+    return rim * radius + centre, shade * radius + centre
+
+
+@functools.lru_cache(maxsize=1024)
+def _crag(index: int) -> tuple[Points, Points]:
+    """crag() of radius 1."""
     rng = np.random.default_rng(1009 + index)
-    n = int(rng.integers(9, 14))
-    bearing = (np.arange(n) + rng.uniform(-0.3, 0.3, n)) * (2.0 * math.pi / n)
-    r = rng.uniform(0.74, 1.0, n)
-    r *= radius / r.max()
+    n = int(rng.integers(11, 16))
+    bearing = (np.arange(n) + rng.uniform(-0.35, 0.35, n)) * (2.0 * math.pi / n)
+    r = rng.uniform(0.76, 1.0, n)
+    r /= r.max()
     rim = np.column_stack((np.cos(bearing), np.sin(bearing))) * r[:, None]
-    # light comes from the north-west: the rim facing south-east, closed over a ridge near the middle, is in shade
-    facing = np.roll(np.arange(n), -int(np.argmin(np.abs(bearing - math.pi * 0.3))))[: n // 2 + 1]
-    ridge = rim[facing][::-1] * rng.uniform(0.05, 0.4, (len(facing), 1)) - 0.06 * radius
-    shade = np.vstack((rim[facing], ridge[1:-1]))
-    return rim + centre, shade + centre
+    # light comes from the north-west: the rim facing south-east, closed over a jagged ridge, is in shade
+    facing = np.roll(np.arange(n), -int(np.argmin(np.abs(bearing - 0.3 * math.pi))))[: n // 2 + 1]
+    ridge = rim[facing][::-1] * rng.uniform(0.1, 0.55, (len(facing), 1))
+    return rim, np.vstack((rim[facing], ridge[1:-1]))
 
 
 def half_width(length: float, beam: float, aspect: float) -> float:

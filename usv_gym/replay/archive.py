@@ -1,8 +1,8 @@
 """The episode archive ``episode.usv``: everything that is needed to redraw and to re-judge one episode.
 
 A zip of ``meta.json``, ``events.json`` and one ``.npy`` member per array, in that order.  ``docs/archive.md`` is the
-format; ``Episode`` is the same thing in memory.  No pickle, so an archive from a stranger is data and nothing else.  Equal
-episodes give equal bytes.
+format; ``Episode`` is the same thing in memory.  No pickle, so an archive from a stranger is data and nothing else.
+Equal episodes give equal bytes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What a run leaves behind for people and other programs: ``ais.nmea``, ``detections.csv``, ``summary.json``.
 
-All of it is made from an ``Episode``, so it can be made again from ``episode.usv`` at any time.  docs/outputs.md has the
-column tables.
+All of it is made from an ``Episode``, so it can be made again from ``episode.usv`` at any time.  docs/outputs.md has
+the column tables.
 """
 
 from __future__ import annotations
@@ -272,7 +272,7 @@ def print_summary(result: dict[str, Any], console: Console | None = None) -> Non
     def table(title: str, *columns: str) -> Table:
         made = Table(title=title, title_justify="left", box=rich.box.SIMPLE_HEAD)
         for k, column in enumerate(columns):
-            made.add_column(column, justify="right" if k else "left")
+            made.add_column(escape(column), justify="right" if k else "left")
         return made
 
     run, ship = result["run"], result["own_ship"]
@@ -312,7 +312,7 @@ def print_summary(result: dict[str, Any], console: Console | None = None) -> Non
         for name, unit in (("radius", "m"), ("course", "deg"), ("speed", "kn")):
             e = result["tdm"][f"{name}_error"]
             values = (_text(e[f"{key}_{unit}"], 2) for key in ("bias", "std", "rms"))
-            other.add_row(f"{name} [{unit}]".replace("[", r"\["), str(e["count"]), *values)
+            other.add_row(escape(f"{name} [{unit}]"), str(e["count"]), *values)
         out.print(other)
 
     if result["ais"]["messages_count"]:
@@ -320,7 +320,7 @@ def print_summary(result: dict[str, Any], console: Console | None = None) -> Non
         for name, e in result["ais"]["errors"].items():
             unit = _AIS_UNITS[name][0]
             values = (_text(e[f"{key}_{unit}"], 2) for key in ("bias", "std", "design_std"))
-            sent.add_row(rf"{name} \[{unit.replace('_per_', '/')}]", str(e["count"]), *values)
+            sent.add_row(escape(f"{name} [{unit.replace('_per_', '/')}]"), str(e["count"]), *values)
         out.print(sent)
 
 

@@ -37,8 +37,8 @@ class _Table:
 class Recorder:
     """Record world ``b`` of a batch: call ``sample`` at the start and after every control step, then ``finish``.
 
-    States are kept at every sample, detections and AIS messages whenever the record shows a new one.  A collision becomes
-    an event by itself; everything else (waypoints, faults, notices) is told with ``event``.
+    States are kept at every sample, detections and AIS messages whenever the record shows a new one.  A collision
+    becomes an event by itself; everything else (waypoints, faults, notices) is told with ``event``.
     """
 
     # views of the record, see _start

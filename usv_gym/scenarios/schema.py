@@ -22,6 +22,7 @@ from pydantic import (
 )
 
 from ..config import ConfigError, Model, locate, problem
+from ..resources import shipped
 from ..units import KNOT, metres_per_degree
 from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
 
@@ -47,11 +48,11 @@ class ShipClass(NamedTuple):
     ais: Literal["A", "B"]
 
 
-#: 10 s is the thesis's heading filter.  Largest turn rates: about 4 lengths of turning diameter at the default speed
+#: 10 s is the thesis's heading filter; the rest are assumptions of this project in the spirit of the thesis's groups
 SHIP_CLASSES: Mapping[str, ShipClass] = {
-    "ship": ShipClass(100.0, 10.0, 10.0, 1.5, "A"),
-    "vessel": ShipClass(30.0, 8.0, 10.0, 4.0, "A"),
-    "boat": ShipClass(8.0, 12.0, 3.0, 15.0, "B"),
+    "ship": ShipClass(100.0, 10.0, 10.0, 1.0, "A"),
+    "vessel": ShipClass(30.0, 8.0, 6.0, 3.0, "A"),
+    "boat": ShipClass(8.0, 12.0, 3.0, 10.0, "B"),
 }
 CONSTANT_TURN_RATE_DEG = 5.0  #: [deg/s] of every ship in the original program
 
@@ -190,10 +191,11 @@ class OwnShip(Model):
     @classmethod
     def _vessel_exists(cls, value: str, info: ValidationInfo) -> str:
         try:
-            locate("vessels", value, (info.context or {}).get("directory"))
+            path = locate("vessels", value, (info.context or {}).get("directory"))
         except ConfigError as error:
             raise problem(str(error)) from None
-        return value
+        # a path that was relative to the file must still hold where the scenario is used or dumped to
+        return value if value in shipped("vessels") else str(path.resolve())
 
 
 def _by_class(what: str) -> Callable[[dict[str, Any]], Any]:

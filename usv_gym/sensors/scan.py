@@ -18,6 +18,21 @@ from .tdm import take_scan
 
 
 @inner
+def deliver(w, o, k, tick):
+    """Hand the last scan of radar (k = 0) or LiDAR (k = 1) to the tracker, once its latency is over."""
+    t = w.tracks
+    if t.scan_due[o, k] < 0 or t.scan_due[o, k] > tick:
+        return
+    t.scan_due[o, k] = -1
+    for s in range(t.id.shape[1]):
+        if t.measured_us[o, k, s] == t.scan_us[o, k]:
+            if k == RADAR - 1:
+                take_scan(w, o, k, s, w.sensors.radar)
+            else:
+                take_scan(w, o, k, s, w.sensors.lidar)
+
+
+@inner
 def _error(w, o, k, s, tick, noise, bias, bias_time, stream_bias, stream_noise):
     """Error (N, E, radius) of a scan at f(d) = 1: drifting bias plus white noise."""
     t = w.tracks
@@ -87,7 +102,8 @@ def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detect
         # the controller's side knows the measured range only
         t.measured[o, k, s, 3] = max(sensor.gain * math.hypot(dn, de), sensor.gain_floor)
         t.measured_us[o, k, s] = tick * w.dt_us
-        take_scan(w, o, k, s, sensor, t.measured[o, k, s], tick * w.dt_us)
+    t.scan_us[o, k] = tick * w.dt_us
+    t.scan_due[o, k] = tick + sensor.latency_us // w.dt_us
 
 
 @inner

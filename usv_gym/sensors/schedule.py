@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..jit import inner
 from .ais import NEVER, next_fire, schedule, transmit
-from .scan import scan_lidar, scan_radar
+from .scan import deliver, scan_lidar, scan_radar
 from .tdm import publish, take_ais
 
 
@@ -28,6 +28,9 @@ def _set_next(w, tick):
         for s in range(w.ais.next_tick.shape[0]):
             soonest = min(soonest, w.ais.next_tick[s])
         for o in range(w.observer.shape[0]):
+            for k in range(2):
+                if w.tracks.scan_due[o, k] > tick:
+                    soonest = min(soonest, w.tracks.scan_due[o, k])
             for s in range(w.ais.next_tick.shape[0]):
                 if w.ais.due_tick[o, s] > tick:
                     soonest = min(soonest, w.ais.due_tick[o, s])
@@ -66,6 +69,8 @@ def sense(w, tick):
             scan_radar(w, o, tick)
         if lidar:
             scan_lidar(w, o, tick)
+        deliver(w, o, 0, tick)
+        deliver(w, o, 1, tick)
         if report:
             publish(w, o, tick)
     _set_next(w, tick)

@@ -1,12 +1,12 @@
 """AIS on the wire: from a transmitted report to NMEA 0183 sentences, encoded by pyais.
 
-The simulation knows a report as numbers (sensors/ais.py); sentences are made on demand.  Which number the wire carries is
-decided by the ``_code`` functions: ``position_report`` sends those codes, and ``quantise_*`` turns them back into SI units,
-which is what a receiver gets and what the kernel is tested against.
+The simulation knows a report as numbers (sensors/ais.py); sentences are made on demand.  Which number the wire carries
+is decided by the ``_code`` functions: ``position_report`` sends those codes, and ``quantise_*`` turns them back into SI
+units, which is what a receiver gets and what the kernel is tested against.
 
 ITU-R M.1371: position in 1/10000 minute, SOG in 0.1 kn (102.2 means that or more), COG in 0.1 degree, true heading in
-whole degrees, rate of turn as 4.733 sqrt(degrees per minute) with its sign, at most 126 (708 degrees per minute or more).
-"Not available" is latitude 91, longitude 181, SOG 102.3, COG 360, heading 511, ROT -128.
+whole degrees, rate of turn as 4.733 sqrt(degrees per minute) with its sign, at most 126 (708 degrees per minute or
+more).  "Not available" is latitude 91, longitude 181, SOG 102.3, COG 360, heading 511, ROT -128.
 """
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def position_report(
 
 
 def static_reports(station: Station) -> list[dict[str, Any]]:
-    """Fields of the static messages of a ship: type 5 (class A), 24 A and B (class B); an aid to navigation has none."""
+    """Fields of the static messages of a ship: type 5 (class A), 24 A and B (class B); aids to navigation have none."""
     name, ship_type = wire_text(station.name), _SHIP_TYPE.get(station.kind, _OTHER_TYPE)
     if station.ais_class == AIS_CLASS_A:
         return [{

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..engine import reset_world, tick_world
 from ..jit import inner, kernel
+from ..traffic.ships import move_traffic
 from ..trig import PI, clip, wrap
 from ..world.autopilot import autopilot, mix
 from .observe import cross_track_error, observe
 from .task import ACTION_CHANNELS, ACTION_DEMAND, ACTION_DISCRETE
 
-_NO_ROWS = np.zeros((0, 0, 4, 3))
 _TURN = PI / 12.0  # of ``discrete``
 _FASTER = 0.125
 
@@ -93,6 +91,7 @@ def step_task(w, task, episode, action, rows, obs, terms):
         tick_world(w, rows, k)
         if task.end_on_collision and w.safety.collided_with[0] >= 0:
             break
+    move_traffic(w, w.tick)
     episode.step += 1
     closest = w.safety.step_closest[0]
     episode.closest = min(episode.closest, closest)

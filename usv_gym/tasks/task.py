@@ -12,8 +12,9 @@ from typing import Any, Literal
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from ..config import Model
 from ..world.state import A
 
 ActionName = Literal["default", "throttle_nozzle", "thrusters", "actuators", "heading_speed", "discrete"]
@@ -53,11 +54,7 @@ DISCRETE = ((0.0, 0.0), (-15.0, 0.0), (15.0, 0.0), (0.0, 0.125), (0.0, -0.125))
 HEADING_SPAN = np.pi / 2.0  #: [rad] heading change that +-1 of ``heading_speed`` asks for
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class RewardWeights(_Frozen):
+class RewardWeights(Model):
     """Weights of the reward terms; each term itself is a metric and stands in ``info["reward_terms"]`` unweighted."""
 
     progress: float = 1.0  #: distance made good along the route in the step / distance at max speed
@@ -70,7 +67,7 @@ class RewardWeights(_Frozen):
     out_of_area: float = 20.0  #: -1 when the area is left
 
 
-class TaskConfig(_Frozen):
+class TaskConfig(Model):
     """The decision problem of an environment."""
 
     action: ActionName = "default"

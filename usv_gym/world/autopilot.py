@@ -12,15 +12,15 @@ _REVERSE_SLOPE = 20.0  # the bucket is all the way over at 5 % of surge demand
 def autopilot(w, p, heading, yaw_rate, speed, heading_ref, speed_ref, h):
     """Demands (surge, yaw), each in [-1, 1], that bring plant p to ``heading_ref`` [rad] and ``speed_ref`` [m/s].
 
-    Heading is a cascade: the wrapped error asks for a yaw rate, limited to ``ap_rate_max``, which a PI law on the measured
-    ``yaw_rate`` [rad/s] follows.  Speed is the inverse of the steady speed curve plus a PI law.  Integrals stand still
-    while their demand is at its limit and the error would push it further (conditional integration).
+    Heading is a cascade: the wrapped error asks for a yaw rate, limited to ``ap_rate_max``, which a proportional law on the
+    measured ``yaw_rate`` [rad/s] follows, plus an integral against wind that waits while either is at its limit.  Speed
+    is the inverse of the steady speed curve plus a PI law, whose integral stands still while the demand is at its limit.
     """
     q = w.plants
-    rate_ref = clip(q.ap_heading[p, 0] * wrap(heading_ref - heading), -q.ap_rate_max[p], q.ap_rate_max[p])
-    error = rate_ref - yaw_rate
-    yaw = q.ap_heading[p, 1] * error + q.ap_integral[p, 0]
-    if abs(yaw) < 1.0 or yaw * error < 0.0:
+    error = wrap(heading_ref - heading)
+    rate_ref = clip(q.ap_heading[p, 0] * error, -q.ap_rate_max[p], q.ap_rate_max[p])
+    yaw = q.ap_heading[p, 1] * (rate_ref - yaw_rate) + q.ap_integral[p, 0]
+    if abs(yaw) < 1.0 and abs(rate_ref) < q.ap_rate_max[p]:
         q.ap_integral[p, 0] = clip(q.ap_integral[p, 0] + q.ap_heading[p, 2] * error * h, -1.0, 1.0)
 
     share = min(abs(speed_ref) / q.ap_speed_max[p], 1.0)

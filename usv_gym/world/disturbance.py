@@ -152,6 +152,8 @@ def wave_step(w, p, j, tick):
     weather = w.weather
     q = w.plants
     if weather.wave_height <= 0.0:
+        for i in range(3):
+            q.tau_wave[p, i] = 0.0
         return
     h = w.dt
     damping = weather.wave_damping
@@ -159,10 +161,9 @@ def wave_step(w, p, j, tick):
     sine, cosine = sincos(weather.wave_to - w.vessels.eta[j, 2])
     omega = abs(omega0 - omega0 * omega0 / GRAVITY * w.vessels.nu[j, 0] * cosine)
     if weather.original != 0:  # Euler, one noise for all degrees of freedom
-        noise = weather.wave_height * rng.normal2(w.seed, rng.WAVE, 3 * j, tick)[0]
+        noise = rng.normal2(w.seed, rng.WAVE, 3 * j, tick)[0]
         x1 = q.wave_x[p, 0, 0]
         x2 = q.wave_x[p, 0, 1]
-        scale = 1.0
         for i in range(3):
             q.wave_x[p, i, 0] = x1 + h * x2
             q.wave_x[p, i, 1] = x2 + h * (noise - omega * omega * x1 - 2.0 * damping * omega * x2)
@@ -177,13 +178,13 @@ def wave_step(w, p, j, tick):
         l11 = math.sqrt(max(1.0 - a11 * a11 - s * s, 0.0))
         l21 = s * (a11 - a22) / l11 if l11 > 0.0 else 0.0
         l22 = math.sqrt(max(1.0 - a22 * a22 - s * s - l21 * l21, 0.0))
-        scale = weather.wave_height * math.sqrt(NOISE_STEP / (4.0 * damping * omega0))
         for i in range(3):
             a, b = rng.normal2(w.seed, rng.WAVE, 3 * j + i, tick)
             y1 = q.wave_x[p, i, 0]
             y2 = q.wave_x[p, i, 1]
             q.wave_x[p, i, 0] = a11 * y1 + s * y2 + l11 * a
             q.wave_x[p, i, 1] = a22 * y2 - s * y1 + l21 * a + l22 * b
+    scale = weather.wave_scale
     q.tau_wave[p, 0] = -scale * q.wave_gain[p, 0] * abs(cosine) * q.wave_x[p, 0, 1]
     q.tau_wave[p, 1] = -scale * q.wave_gain[p, 1] * abs(sine) * q.wave_x[p, 1, 1]
     q.tau_wave[p, 2] = scale * q.wave_gain[p, 2] * q.wave_x[p, 2, 1]
@@ -242,6 +243,7 @@ def set_weather(
         what this weather does to the sensors, 1 = nothing.
     """
     weather: Any = world["weather"]
+    weather["wind_u10"], weather["current"] = 0.0, 0.0  # written by weather_reset, and by weather_step if on
     weather["on"] = wind_speed > 0.0 or current_speed > 0.0 or wave_height > 0.0
     weather["original"] = original
     weather["wind_speed"], weather["wind_to"] = wind_speed, wind_to
@@ -254,7 +256,10 @@ def set_weather(
         process["std"], process["time_constant"], process["limit"] = std if gusts else 0.0, time_constant, limit
     # modal frequency of the Pierson-Moskowitz spectrum, omega0^4 = 4 B / 5 with B = 3.11 / Hs^2; the original left out 4
     spectrum = 3.11 / wave_height**2 if wave_height > 0.0 else 0.0
-    weather["wave_omega0"] = ((1.0 if original else 4.0) * spectrum / 5.0) ** 0.25
-    weather["wave_damping"] = 0.1017
+    weather["wave_omega0"] = omega0 = ((1.0 if original else 4.0) * spectrum / 5.0) ** 0.25
+    weather["wave_damping"] = damping = 0.1017
+    # stationary spread of x2 that white noise gives which the original drew with spread Hs every 0.05 s
+    filtered = math.sqrt(NOISE_STEP / (4.0 * damping * omega0)) if wave_height > 0.0 and not original else 1.0
+    weather["wave_scale"] = wave_height * filtered
     weather["radar_range_factor"], weather["lidar_range_factor"] = radar_range_factor, lidar_range_factor
     weather["detection_factor"] = detection_factor

@@ -115,12 +115,12 @@ def _acceleration(w, p, u, v, r, friction, surge, sway, yaw):
     m23 = q.m23[p]
     m32 = q.m32[p]
     m33 = q.m33[p]
-    if q.coriolis_full[p] != 0:  # Kirchhoff's equations: does no work
-        surge += (m22 * v + m23 * r) * r
-        sway -= m11 * u * r
-        yaw -= (m22 * v + m23 * r) * u - m11 * u * v
-    else:
-        sway -= q.c26[p] * u * r
+    c11 = q.coriolis[p, 0]
+    sway -= c11 * u * r
+    if q.coriolis_linearised[p] == 0:  # does no work
+        momentum = q.coriolis[p, 1] * v + q.coriolis[p, 2] * r
+        surge += momentum * r
+        yaw -= momentum * u - c11 * u * v
     if av >= q.crossflow_dead_zone[p]:
         drag = 0.5 * WATER_DENSITY * q.draught[p] * q.cd2d[p]
         force, moment = crossflow(v, r, q.strip_x0[p], q.strip_x1[p])

@@ -60,6 +60,7 @@ def _weather() -> Dtype:
         # waves
         ("wave_height", f8), ("wave_to", f8),  # significant height [m], travelling towards [rad]
         ("wave_omega0", f8), ("wave_damping", f8),  # modal frequency [rad/s], relative damping
+        ("wave_scale", f8),  # spread of the wave force per unit of gain [m]; in the preset `original` that of its noise
         # what weather does to sensors, as factors of range and of missed detections (1 = clear)
         ("radar_range_factor", f8), ("lidar_range_factor", f8), ("detection_factor", f8),
     ], align=True)  # fmt: skip
@@ -70,8 +71,8 @@ def _plants(P: int) -> Dtype:
     return np.dtype([
         # rigid body and added mass, M = [[m11, 0, 0], [0, m22, m23], [0, m32, m33]]
         ("m11", f8, (P,)), ("m22", f8, (P,)), ("m23", f8, (P,)), ("m32", f8, (P,)), ("m33", f8, (P,)),
-        ("coriolis_full", i1, (P,)),  # 1: C(nu) from M (Fossen 2021, theorem 3.2); 0: only c26 * u * r in sway
-        ("c26", f8, (P,)),  # linearised Coriolis coefficient of sway [kg]
+        # C(nu) nu = [-(c22 v + c23 r) r, c11 u r, (c22 v + c23 r) u - c11 u v]; linearised: c11 u r in sway, nothing else
+        ("coriolis", f8, (P, 3)), ("coriolis_linearised", i1, (P,)),  # c11, c22 [kg], c23 [kg m]
         # damping derivatives as in the literature: force = derivative * motion, hence negative numbers for drag
         ("Xu", f8, (P,)), ("Xuu", f8, (P,)), ("Xuuu", f8, (P,)),
         ("Xuu_ittc", f8, (P,)),  # times (0.075 / (log10 Re - 2)^2 + 0.014) |u| u
@@ -108,8 +109,9 @@ def _plants(P: int) -> Dtype:
         ("reverse_by_bucket", i1, (P,)),
         # faults, written by scenario events: share of thrust that is left, nozzle held where it is
         ("thrust_left", f8, (P, A)), ("nozzle_stuck", i1, (P, A)),
-        # autopilot: heading error to yaw rate [1/s], rate error to demand [s/rad], its integral [1/rad]; speed error to
-        # demand [s/m], its integral [1/m], exponent of the steady speed curve; speed at full demand, largest yaw rate
+        # autopilot: heading error to yaw rate [1/s], rate error to demand [s/rad], integral of heading error [1/(rad s)];
+        # speed error to demand [s/m], its integral [1/m], exponent of the steady speed curve; speed at full demand
+        # [m/s], largest yaw rate asked for [rad/s]
         ("ap_heading", f8, (P, 3)), ("ap_speed", f8, (P, 3)), ("ap_speed_max", f8, (P,)), ("ap_rate_max", f8, (P,)),
         ("ap_integral", f8, (P, 2)),  # state: heading, speed
         # state
@@ -189,6 +191,7 @@ def _sensors() -> Dtype:
         # AIS, as transmitted: E and N [m], COG [rad], true heading ("track") [rad], SOG [m/s], ROT [rad/s]
         ("ais_on", i1), ("ais_range", f8), ("ais_loss", f8), ("ais_latency_us", i8),
         ("ais_interval_us", i8),  # fixed interval; 0: the schedule of ITU-R M.1371
+        ("ais_timeout", f8),  # in expected reporting intervals
         ("ais_noise", f8, (6,)), ("ais_bias", f8, (6,)), ("ais_bias_time", f8, (6,)),
         ("ais_quantised", i1),  # what is received has the resolution of the wire
         ("ais_jammed", i1),
@@ -256,6 +259,7 @@ def _tracks(O: int, S: int) -> Dtype:
         ("scan_bias_us", i8, (O, 2, S)),
         ("measured", f8, (O, 2, S, 4)),  # last raw measurement: N, E, radius, f(d)
         ("measured_us", i8, (O, 2, S)),
+        ("scan_us", i8, (O, 2)), ("scan_due", i8, (O, 2)),  # stamp of the last scan; tick at which it arrives, -1: did
         ("visible", i1, (O, 2, S)),  # whether the last scan of that sensor could see the source (truth of the sensor)
     ], align=True)  # fmt: skip
 
@@ -297,6 +301,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         # work space of the shadow test (sensors/shadow.py) and of the hull distance (world/geometry.py)
         ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("order", i4, (S,)), ("hidden", i1, (S,)),
         ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)), ("hull", f8, (2, 5, 2)),
+        ("estimate_x", f8, (2, 7)), ("estimate_p", f8, (2, 28)),  # of the fusion (sensors/tdm.py)
     ], align=True)  # fmt: skip
 
 

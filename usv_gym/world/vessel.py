@@ -54,9 +54,13 @@ class Mass(_Model):
 
 
 class Coriolis(_Model):
-    """``full``: from the mass matrix.  ``linearised``: -sway_kg u r in sway, nothing else."""
+    """Coriolis and centripetal forces.
 
-    form: Literal["full", "linearised"]
+    ``full``: from the mass matrix with added mass, Munk moment included.  ``rigid_body``: of the hull alone.
+    ``linearised``: -sway_kg u r in sway, nothing else.
+    """
+
+    form: Literal["full", "rigid_body", "linearised"]
     sway_kg: float = 0.0
 
 
@@ -158,7 +162,7 @@ class Autopilot(_Model):
 
     heading_gain: Positive
     rate_gain: Positive
-    rate_integral: NonNegative
+    heading_integral: NonNegative
     rate_max_deg_s: Positive
     speed_gain: Positive
     speed_integral: NonNegative
@@ -187,6 +191,15 @@ class VesselModel(_Model):
     reverse_by_bucket: bool = False
     autopilot: Autopilot
     fluid_memory: FluidMemory | None = None
+
+    def coriolis_masses(self) -> tuple[float, float, float]:
+        """c11, c22 [kg] and c23 [kg m] of C(nu) (``state.py``)."""
+        if self.coriolis.form == "linearised":
+            return self.coriolis.sway_kg, 0.0, 0.0
+        if self.coriolis.form == "rigid_body":
+            return self.mass.mass_kg, self.mass.mass_kg, self.mass.mass_kg * self.mass.centre_of_gravity_x_m
+        m = self.mass.matrix()
+        return float(m[0, 0]), float(m[1, 1]), float(m[1, 2])
 
 
 def load_vessel(name_or_path: str | Path) -> VesselModel:
@@ -269,7 +282,7 @@ def write_plant(
     values: dict[str, Any] = dict(model.damping)
     m = model.mass.matrix()
     values |= {"m11": m[0, 0], "m22": m[1, 1], "m23": m[1, 2], "m32": m[2, 1], "m33": m[2, 2]}
-    values |= {"coriolis_full": model.coriolis.form == "full", "c26": model.coriolis.sway_kg}
+    values |= {"coriolis": model.coriolis_masses(), "coriolis_linearised": model.coriolis.form == "linearised"}
     flow, wind, waves, pilot = model.crossflow, model.wind, model.waves, model.autopilot
     values |= {
         "cd2d": flow.drag_coefficient, "draught": flow.draught_m, "strip_x0": flow.from_x_m, "strip_x1": flow.to_x_m,
@@ -286,7 +299,7 @@ def write_plant(
         "bucket_in_yaw": not original,
         "euler_actuators": original,
         "reverse_by_bucket": model.reverse_by_bucket,
-        "ap_heading": (pilot.heading_gain, pilot.rate_gain, pilot.rate_integral),
+        "ap_heading": (pilot.heading_gain, pilot.rate_gain, pilot.heading_integral),
         "ap_speed": (pilot.speed_gain, pilot.speed_integral, pilot.speed_curve_exponent),
         "ap_speed_max": model.max_speed, "ap_rate_max": pilot.rate_max_deg_s * DEG,
         "thrusters": len(model.thrusters),

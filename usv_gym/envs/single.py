@@ -1,0 +1,183 @@
+"""The Gymnasium face: one world."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scenarios.loader import Source
+from ..tasks.task import TaskConfig, unflatten
+from .core import Core, check_weather
+from .notice import compiling
+
+_ONE = np.ones(1, np.bool_)
+
+
+class USVEnv(gym.Env[Any, Any]):
+    """An unmanned surface vehicle follows a route through ships and obstacles that it knows from its sensors only.
+
+    Description
+    -----------
+    A 3-DOF vessel with its real actuators sails among kinematic ships, icebergs and other discs, in wind, current and waves.
+    Radar, LiDAR and AIS measure the surroundings; the Target Detection Module (TDM) fuses them with Kalman filters into the
+    list of detected targets that the agent observes.  ``OpenSea-v0`` draws a new sea at every reset; ``Scenario-v0`` runs a
+    scenario file.
+
+    Action space
+    ------------
+    ``action=`` picks one; all boxes are [-1, 1].
+
+    ================== ============== ==================================================================================
+    name               space          meaning
+    ================== ============== ==================================================================================
+    ``default``                       what the vessel file says: ``throttle_nozzle`` for Odin, ``thrusters`` for Otter
+    throttle_nozzle    Box(2)         surge demand (astern below 0) and yaw demand (to starboard above 0)
+    thrusters          Box(thrusters) shaft speed of each thruster
+    actuators          Box(channels)  shaft speed, nozzle and bucket of each thruster that has them
+    heading_speed      Box(2)         heading change / 90 deg from the measured heading; speed from 0 to the largest
+    discrete           Discrete(5)    hold; 15 deg to port; to starboard; 1/8 of the largest speed faster; slower
+    ================== ============== ==================================================================================
+
+    Observation space
+    -----------------
+    A float32 Box in [-1, 1] (or, with ``flat=False``, a Dict of ``own``, ``targets`` and ``mask``): twelve numbers of own
+    navigation and route, then nine per target for the K nearest (``targets=``), or one per sector.  docs/environments.md has
+    the table with the units.
+
+    ============ =======================================================================================================
+    observation  what it tells of the surroundings
+    ============ =======================================================================================================
+    ``tracks``   the nearest detected targets as the TDM last reported them (default)
+    ``ais``      the nearest ships by the last AIS message received of each
+    ``sectors``  closeness of the nearest detected target in each bearing sector
+    ``truth``    the nearest objects as they really are (for ablation only; no sensor is simulated)
+    ============ =======================================================================================================
+
+    Rewards
+    -------
+    The weighted sum of named terms, which ``info["reward_terms"]`` gives unweighted: progress, cross_track, proximity,
+    effort, time, collision, arrival, out_of_area.  Weights: ``reward={"collision": 100}``.
+
+    Starting state
+    --------------
+    The own ship at the start of its route; AIS, radar and LiDAR have not fired yet, so no target is known.
+
+    Episode end
+    -----------
+    Terminated by a collision of the hulls, by reaching the last waypoint, or by leaving the area; truncated at the end of the
+    scenario's duration.
+
+    Arguments
+    ---------
+    action, observation, targets, sectors, flat, reward and the other fields of ``TaskConfig``; ``scenario`` (Scenario-v0);
+    ``vessel``, ``difficulty``, ``weather``; ``overrides``: a list of ``KEY=VALUE`` on the scenario.
+    ``reset(options=...)`` takes scenario, vessel, weather and difficulty.
+
+    Version history
+    ---------------
+    v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(
+        self,
+        scenario: Source | None = None,
+        *,
+        vessel: str | None = None,
+        difficulty: float = 0.5,
+        weather: str | Mapping[str, Any] | None = None,
+        overrides: Sequence[str] = (),
+        reward: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        **task: Any,
+    ) -> None:
+        from ..config import Document, validate
+
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode: expected one of {self.metadata['render_modes']}, got {render_mode!r}")
+        check_weather(weather)
+        config = validate(TaskConfig, Document("environment arguments", {**task, "reward": dict(reward or {})}))
+        self.render_mode = render_mode
+        with compiling():
+            self.core = Core(1, source=scenario, config=config, vessel=vessel, overrides=overrides, difficulty=difficulty,
+                             weather=weather)  # fmt: skip
+        self.action_space = self.core.action_space
+        self.observation_space = self.core.observation_space
+        self._discrete = self.core.action_name == "discrete"
+        self._started = False
+        self._trail: list[tuple[float, ...]] = []
+
+    def _observation(self) -> Any:
+        flat = self.core.obs[0]
+        return flat.copy() if self.core.config.flat else unflatten(self.core.config, flat)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start a new episode; options: scenario, vessel, weather, difficulty."""
+        super().reset(seed=seed)
+        self.core.configure(options)
+        with compiling():
+            self.core.reset(_ONE, [self.np_random])
+        self.core.terms[0] = 0.0
+        self._started = True
+        return self._observation(), self.core.info(0)
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Advance by one control interval.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            before the first reset.
+        ValueError
+            if the action has a wrong shape or is not finite.
+        """
+        if not self._started:
+            raise gym.error.ResetNeeded("call reset() before step()")
+        core = self.core
+        try:
+            core.actions[0] = action
+        except (ValueError, TypeError):
+            raise ValueError(f"action {action!r} does not fit {self.action_space}") from None
+        core.step(_ONE)
+        return (self._observation(), float(core.reward[0]), bool(core.terminated[0]), bool(core.truncated[0]),
+                core.info(0))  # fmt: skip
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """The map as [H, W, 3] for ``rgb_array``; None without a render mode."""
+        if self.render_mode is None:
+            warnings.warn("render() needs a render_mode; pass render_mode='rgb_array' to gym.make", stacklevel=2)
+            return None
+        from ..render import render_world
+
+        return render_world(self.core.worlds[0], self.core.names)
+
+    @property
+    def world(self) -> Any:
+        """The record of the world (a view; see world/state.py)."""
+        return self.core.worlds[0]
+
+
+class OpenSeaEnv(USVEnv):
+    """``usv_gym/OpenSea-v0``: a new random open sea at every reset."""
+
+    __doc__ = USVEnv.__doc__
+
+    def __init__(self, **kwargs: Any) -> None:
+        if "scenario" in kwargs:
+            raise ValueError("OpenSea-v0 draws its own sea; use usv_gym/Scenario-v0 for scenario=")
+        super().__init__(None, **kwargs)
+
+
+class ScenarioEnv(USVEnv):
+    """``usv_gym/Scenario-v0``: a scenario by name, path or mapping."""
+
+    __doc__ = USVEnv.__doc__
+
+    def __init__(self, scenario: Source = "busy_open_sea", **kwargs: Any) -> None:
+        super().__init__(scenario, **kwargs)

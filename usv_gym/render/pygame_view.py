@@ -1,0 +1,260 @@
+"""Draws a scene with pygame-ce, on a surface in memory: no window, no display.
+
+image = render(scene)                         # uint8 [800, 1180, 3]
+save_png(render(scene, palette="dark"), "map.png")
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..replay.archive import replacing
+from .canvas import Canvas, load_pygame, text_size
+from .labels import Box, Placed, Request, place
+from .palette import PALETTES
+from .panel_view import WIDTH as PANEL_WIDTH
+from .panel_view import draw_panel
+from .primitives import LAYERS, Circle, Dots, Label, Points, Polygon, Polyline, Primitive, Scene
+from .shapes import nice_step
+
+SIZES = (12, 11)  #: [px] of the first and the second line of a label
+SMALL = 11  #: [px] text of the grid and of the scale
+
+
+@dataclass(frozen=True)
+class View:
+    """Which part of {n} the map shows: its centre [m], in the middle of the map, and pixels per metre; north is up."""
+
+    north: float
+    east: float
+    scale: float
+
+    @staticmethod
+    def fit(extent: tuple[float, float, float, float], width: float, height: float) -> View:
+        """All of south, north, west, east [m] in a map of width x height pixels."""
+        south, north, west, east = extent
+        scale = min(width / max(east - west, 1.0), height / max(north - south, 1.0))
+        return View(0.5 * (south + north), 0.5 * (west + east), scale)
+
+
+def render(
+    scene: Scene,
+    size: tuple[int, int] = (1180, 800),
+    palette: str = "day",
+    view: View | None = None,
+    *,
+    panel: bool | None = None,
+    supersample: int = 2,
+) -> NDArray[np.uint8]:
+    """Picture of a scene.
+
+    Parameters
+    ----------
+    scene
+        what to draw.
+    size
+        width and height [px].
+    palette
+        "day", "dark" or "night".
+    view
+        part of the sea to show; the scene's extent when None.
+    panel
+        whether gauges, targets and plots stand beside the map; when None, if that leaves the map most of the picture.
+    supersample
+        smoothness: 1 is jagged and fastest, 2 is good, 3 for print.
+
+    Returns
+    -------
+    array
+        uint8 [height, width, 3], red, green, blue.
+
+    Raises
+    ------
+    ValueError
+        if the palette is unknown or the size not positive.
+    DependencyNotInstalled
+        if pygame-ce is not installed.
+    """
+    if palette not in PALETTES:
+        raise ValueError(f"unknown palette {palette!r}: one of {', '.join(PALETTES)}")
+    if min(size) < 1 or supersample < 1:
+        raise ValueError(f"size and supersample must be positive, not {size} and {supersample}")
+    beside = size[0] - PANEL_WIDTH >= 0.6 * size[1] if panel is None else panel
+    canvas = Canvas(size, palette, supersample)
+    width = size[0] - PANEL_WIDTH if beside else size[0]
+    if width > 0:
+        _Map(canvas, scene, width, size[1], view or View.fit(scene.extent, width, size[1]), title=not beside).draw()
+    if beside:
+        draw_panel(canvas, scene.panel, (max(width, 0), 0, size[0], size[1]))
+    return canvas.finish()
+
+
+def save_png(picture: NDArray[np.uint8] | Scene, path: str | os.PathLike[str], **options: Any) -> None:
+    """Write a picture, or a scene with the options of `render`, as PNG; the file appears whole or not at all.
+
+    Raises
+    ------
+    OSError
+        if the file cannot be written.
+    """
+    image = render(picture, **options) if isinstance(picture, Scene) else picture
+    pg = load_pygame()
+    buffer = io.BytesIO()
+    pg.image.save(pg.surfarray.make_surface(image.swapaxes(0, 1)), buffer, "map.png")
+    with replacing(path) as file:
+        file.write(buffer.getvalue())
+
+
+class _Map:
+    """The map of one picture, in the rectangle (0, 0, width, height) of a canvas."""
+
+    def __init__(self, canvas: Canvas, scene: Scene, width: int, height: int, view: View, title: bool) -> None:
+        self.canvas, self.scene, self.view = canvas, scene, view
+        self.width, self.height, self.title = width, height, title
+        self.step = nice_step(width / view.scale, 8.0)  # of the grid [m]
+        self.bodies: list[Box] = []  # hulls and obstacles: labels rather stand beside them
+
+    def draw(self) -> None:
+        """Everything, bottom up; labels last, for they look for free places."""
+        self.canvas.box((0, 0, *self.canvas.size), "sea")
+        layers = self.scene.layers
+        for p in layers.get("shadows", []):
+            if isinstance(p, Polygon):
+                self.canvas.tint(self.px(p.points), p.role)
+        self._grid()
+        for name in LAYERS:
+            if name not in ("shadows", "labels"):
+                for primitive in layers.get(name, []):
+                    self._primitive(primitive, name in ("obstacles", "vessels", "own"))
+        plates = self._furniture()
+        self._labels([p for p in layers.get("labels", []) if isinstance(p, Label)], plates)
+
+    def px(self, points: Points) -> Points:
+        """Metres {n} to pixels, [n, 2]."""
+        return points[:, ::-1] * (self.view.scale, -self.view.scale) + self._at((0.0, 0.0))
+
+    def _at(self, place: tuple[float, float]) -> tuple[float, float]:
+        view = self.view
+        x = 0.5 * self.width + (place[1] - view.east) * view.scale
+        return x, 0.5 * self.height - (place[0] - view.north) * view.scale
+
+    def _primitive(self, p: Primitive, body: bool) -> None:
+        if isinstance(p, Polygon):
+            points = self._outline(p)
+            self.canvas.polygon(points, p.role)
+            if body:
+                (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
+                self.bodies.append((float(x0), float(y0), float(x1), float(y1)))
+        elif isinstance(p, Polyline):
+            self.canvas.polyline(self.px(p.points), p.role, p.arrow)
+        elif isinstance(p, Circle):
+            self.canvas.circle(self._at(p.centre), max(p.radius * self.view.scale, 0.5 * p.min_px), p.role)
+        elif isinstance(p, Dots):
+            self.canvas.dots(self.px(p.points), p.role, p.px)
+
+    def _outline(self, p: Polygon) -> Points:
+        """Pixels of a polygon, grown about its anchor to the smallest size it is drawn at."""
+        points = self.px(p.points)
+        size = p.size * self.view.scale
+        if 0.0 < size < p.min_px:
+            anchor = np.array(self._at(p.anchor))
+            points = anchor + (points - anchor) * (p.min_px / size)
+        return points
+
+    # --- furniture: what belongs to the picture and not to the sea ---------------------------------------------------
+    def _grid(self) -> None:
+        """Lines at round coordinates, and the coordinates along the left and the lower edge."""
+        w, h, view, step = self.width, self.height, self.view, self.step
+        half_n, half_e = 0.5 * h / view.scale, 0.5 * w / view.scale
+        for k in range(math.ceil((view.north - half_n) / step), math.floor((view.north + half_n) / step) + 1):
+            y = self._at((k * step, 0.0))[1]
+            self.canvas.polyline(np.array([(0.0, y), (w, y)]), "grid")
+            if 70.0 < y < h - 70.0:
+                self.canvas.text(f"N {k * step:.0f}", (5.0, y - 13.0), "text_muted", SMALL, halo=True)
+        for k in range(math.ceil((view.east - half_e) / step), math.floor((view.east + half_e) / step) + 1):
+            x = self._at((0.0, k * step))[0]
+            self.canvas.polyline(np.array([(x, 0.0), (x, h)]), "grid")
+            if w > 500 and 280.0 < x < w - 70.0:
+                self.canvas.text(f"E {k * step:.0f}", (x + 4.0, h - 16.0), "text_muted", SMALL, halo=True)
+
+    def _furniture(self) -> list[Box]:
+        """Scale bar, north arrow and, without a panel, the title.  Returns the boxes labels must keep off."""
+        boxes = [self._scale_bar(), self._north_arrow()]
+        if self.title:
+            boxes.append(self._title())
+        if self.height > 140:  # the coordinates along the edges
+            w, h = float(self.width), float(self.height)
+            boxes += [(0.0, 0.0, 42.0, h), (0.0, h - 18.0, w, h)]
+        return boxes
+
+    def _scale_bar(self) -> Box:
+        c, step = self.canvas, self.step
+        parts = 2 if 4.0 * step * self.view.scale > 0.35 * self.width else 4
+        length = parts * step * self.view.scale
+        x, y = 22.0, self.height - 24.0
+        plate = (x - 14.0, y - 24.0, x + length + 34.0, y + 14.0)
+        c.box(plate, "plate", 5.0)
+        for k in range(parts):
+            left, right = x + k * length / parts, x + (k + 1) * length / parts
+            c.box((left, y, right, y + 5.0), "scale" if k % 2 == 0 else "scale_gap")
+        for k in range(parts + 1):
+            text = f"{k * step:g}" + (" m" if k == parts else "")
+            shift = 0.5 * text_size(f"{k * step:g}", SMALL)[0]
+            c.text(text, (x + k * length / parts - shift, y - 16.0), "text", SMALL)
+        return plate
+
+    def _north_arrow(self) -> Box:
+        c, (x, y) = self.canvas, (self.width - 40.0, 44.0)
+        c.circle((x, y), 24.0, "plate")
+        right = np.array([(x, y - 17.0), (x + 8.0, y + 13.0), (x, y + 7.0)])
+        c.polygon(right, "needle")
+        c.polygon(right * (-1.0, 1.0) + (2.0 * x, 0.0), "needle_light")
+        c.text("N", (x, y + 27.0), "text", 13, 0.5, halo=True)
+        return x - 27.0, y - 27.0, x + 27.0, y + 43.0
+
+    def _title(self) -> Box:
+        """Title, times and the most wanted gauges in a strip at the top left."""
+        c, panel = self.canvas, self.scene.panel
+        lines = [" · ".join((panel.title, *panel.status)), "   ".join(f"{k} {v}" for k, v in panel.gauges[:3])]
+        room = self.width - 110.0
+        lines = [line for line in lines if line]
+        size = next((s for s in (13, 12, 11, 10) if max(text_size(t, s)[0] for t in lines) + 20.0 <= room), 0)
+        if not size:
+            return 0.0, 0.0, 0.0, 0.0
+        width = max(text_size(t, size)[0] for t in lines) + 20.0
+        plate = (10.0, 10.0, 10.0 + width, 18.0 + 18.0 * len(lines))
+        c.box(plate, "plate", 5.0)
+        for k, line in enumerate(lines):
+            c.text(line, (20.0, 15.0 + 18.0 * k), "text" if k == 0 else "text_muted", size)
+        return plate
+
+    # --- labels ------------------------------------------------------------------------------------------------------
+    def _labels(self, labels: list[Label], keep_out: list[Box]) -> None:
+        requests = [self._request(label) for label in labels]
+        frame = (4.0, 4.0, self.width - 4.0, self.height - 4.0)
+        placed = place(requests, frame, keep_out, self.bodies)
+        for result in placed:
+            if result is not None and result.leader is not None:
+                self.canvas.polyline(np.array(result.leader), "leader")
+        for label, result in zip(labels, placed, strict=True):
+            if result is not None:
+                self._write(label, result)
+
+    def _request(self, label: Label) -> Request:
+        sizes = [text_size(text, size) for text, size in zip(label.lines, SIZES, strict=False)]
+        size = (max(w for w, _ in sizes) + 2.0, sum(h for _, h in sizes) + 1.0)
+        clearance = max(label.clearance * self.view.scale, 7.0)
+        return Request(size, self._at(label.anchor), clearance, label.priority, label.fixed)
+
+    def _write(self, label: Label, where: Placed) -> None:
+        x, y = where.box[0] + 1.0, where.box[1]
+        for k, (text, size) in enumerate(zip(label.lines, SIZES, strict=False)):
+            self.canvas.text(text, (x, y), label.role if k == 0 else "text_muted", size, halo=True)
+            y += text_size(text, size)[1]

@@ -1,0 +1,102 @@
+"""From a name, a file, the thesis's files or a dict to a frozen :class:`Scenario`."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from ..config import ConfigError, Document, locate, read_yaml, validate
+from ..world.vessel import load_vessel
+from .schema import DT, Preset, Scenario
+from .thesis_format import convert, kind_of, read_thesis
+
+Source: TypeAlias = "str | Path | Sequence[str | Path] | Mapping[str, Any] | Scenario"
+
+
+class SensorRateWarning(UserWarning):
+    """A sensor is asked to fire more often than there are ticks."""
+
+
+def load_scenario(
+    source: Source, *, overrides: Sequence[str] = (), vessel: str | None = None, preset: Preset | None = None
+) -> Scenario:
+    """Read a scenario.
+
+    Parameters
+    ----------
+    source
+        a name that ships in ``configs/scenarios``; the path of a native YAML file; the thesis's own files, as a
+        directory or as paths in any order; a mapping with the native keys; or a scenario, to override.
+    overrides
+        ``key.path=value`` each, in native keys, with the value as in YAML: ``"ships.ferry.waypoints.0=[100, 0]"``.
+    vessel, preset
+        short for overriding ``own_ship.vessel`` and ``preset``.
+
+    Raises
+    ------
+    ConfigError
+        one line per problem, with file, line, key path, what was expected and what came.
+
+    Warns
+    -----
+    SensorRateWarning
+        once, if sensors are faster than the tick: they fire every tick, as in the original.  The rates that the thesis
+        itself asks for at its own tick (MRU, IMU and wind) pass silently in native scenarios.
+    """
+    document, native = _document(source)
+    document = _named_sensors_as_mapping(document).override(overrides)
+    for path, value in ((("own_ship", "vessel"), vessel), (("preset",), preset)):
+        if value is not None:
+            document = document.replaced(path, value, f"argument {path[-1]}={value!r}")
+    scenario = validate(Scenario, document)
+    model = load_vessel(scenario.own_ship.vessel)
+    if scenario.own_ship.memory and model.fluid_memory is None:
+        raise ConfigError(f"{document.where(('own_ship', 'memory'))}: vessel {model.name!r} has no fluid_memory")
+    _warn_of_fast_sensors(scenario, Scenario() if native else None)
+    return scenario
+
+
+def _document(source: Source) -> tuple[Document, bool]:
+    """The data of a native scenario, and whether it was written as one."""
+    if isinstance(source, Scenario):
+        return Document(source.name or "scenario", source.dump()), True
+    if isinstance(source, Mapping):
+        return Document("scenario", dict(source)), True
+    if not isinstance(source, str | Path):
+        paths = list(source)
+        if not paths:
+            raise ConfigError("scenario: expected a name, a path, paths or a mapping, got an empty list")
+        return _document(paths[0]) if len(paths) == 1 else (read_thesis(paths), False)
+    if Path(source).is_dir():
+        return read_thesis([source]), False
+    is_file = Path(source).suffix in (".yaml", ".yml") or Path(source).is_file()
+    path = Path(source) if is_file else locate("scenarios", str(source))
+    document = read_yaml(path)
+    if kind_of(document.data) is not None:
+        return convert([document], name=str(path)), False
+    if not document.data.get("name"):
+        document.data["name"] = path.stem
+    return document, True
+
+
+def _named_sensors_as_mapping(document: Document) -> Document:
+    """``sensors: thesis`` as ``sensors: {base: thesis}``, so that ``sensors.radar.range=500`` can be written there."""
+    sensors = document.data.get("sensors", "thesis")
+    if not isinstance(sensors, str):
+        return document
+    return Document(
+        document.name, {**document.data, "sensors": {"base": sensors}}, document.origins, document.directory
+    )
+
+
+def _warn_of_fast_sensors(scenario: Scenario, usual: Scenario | None) -> None:
+    fast = scenario.faster_than_tick()
+    if usual is not None and scenario.simulation.dt <= DT:
+        known = usual.sensor_rates()
+        fast = {key: rate for key, rate in fast.items() if rate > known[key]}
+    if fast:
+        names = ", ".join(f"{key} ({rate:g} Hz)" for key, rate in fast.items())
+        message = f"faster than the tick of {scenario.simulation.dt:g} s, so firing every tick: {names}"
+        warnings.warn(message, SensorRateWarning, stacklevel=3)
