@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 from typing import Any
@@ -17,18 +18,23 @@ from usv_gym.world.autopilot import autopilot, mix
 from usv_gym.world.disturbance import set_weather, wave_step, weather_reset, weather_step
 from usv_gym.world.dynamics import plant_step
 from usv_gym.world.state import world_dtype
-from usv_gym.world.vessel import load_vessel, write_plant
+from usv_gym.world.vessel import VesselModel, load_vessel, write_plant
 
 GOLDEN = Path(__file__).parent / "golden" / "steady_motion.json"
 RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "data" / "original"
 DTYPE = world_dtype(8, 16)
 
 
+@functools.cache
+def model(vessel: str) -> VesselModel:
+    return load_vessel(vessel)
+
+
 def make_world(vessel="odin", preset="standard", memory=False, dt=0.05, seed=1, **weather) -> np.ndarray[Any, Any]:
     """One world with one vessel at rest at the origin, heading north."""
     worlds = np.zeros(1, DTYPE)
     worlds["dt"], worlds["dt_us"], worlds["seed"] = dt, round(dt * 1e6), seed
-    write_plant(load_vessel(vessel), worlds, 0, 0, preset=preset, memory=memory)
+    write_plant(model(vessel), worlds, 0, 0, preset=preset, memory=memory)
     set_weather(worlds[0], original=preset == "original", **weather)
     reset(worlds)
     return worlds

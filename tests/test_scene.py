@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import subprocess
 import sys
@@ -313,7 +312,7 @@ def test_each_palette_renders(palette):
     image = render(scene_from_episode(an_episode()), palette=palette)
     assert image.shape == (800, 1180, 3)
     assert image.dtype == np.uint8
-    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+    assert len(np.unique(image.astype(np.int32) @ (65536, 256, 1))) > 50
     mean = {"day": (180, 240), "dark": (5, 60), "night": (2, 30)}[palette]
     assert mean[0] < image.mean() < mean[1]
 
@@ -373,8 +372,3 @@ def test_without_pygame_the_error_says_what_to_install(monkeypatch):
             canvas.load_pygame()
     finally:
         canvas.load_pygame.cache_clear()
-
-
-def test_scenes_are_plain_data():
-    scene = scene_from_snapshot(a_world()[0])
-    assert dataclasses.replace(scene, extent=(0.0, 1.0, 0.0, 1.0)).layers is scene.layers

@@ -94,7 +94,7 @@ class Oracle(ExtendedKalmanFilter):
         self.x = self.motion(self.x, self.h)
 
     def advance(self, h):
-        steps = math.ceil(h / ekf.SUBSTEP)
+        steps = ekf.substeps(h, self.x[4])
         for _ in range(steps):
             self.h = h / steps
             nudge = 1e-30j * np.eye(self.dim_x)
@@ -282,7 +282,7 @@ def matched(rng, s, seeds, steps, h, fine=20):
     return out
 
 
-def study(rng, s, truth, h):
+def study(rng, s, truth, h, wrapped=True):
     """Errors [S, T, 4, 5], packed covariances and errors of the radius [S, T, 3] of all filters and their fusion."""
     seeds, steps = truth.shape[:2]
     z = np.repeat(truth[:, :, None], 3, axis=2)
@@ -290,6 +290,8 @@ def study(rng, s, truth, h):
     shape = (seeds, steps, 5)
     z[:, :, AIS] += rng.normal(size=shape) * s["ais_noise"][pick]
     z[:, :, AIS] += gauss_markov(rng, shape, s["ais_bias"][pick], s["ais_bias_time"][pick], h)
+    if wrapped:
+        z[:, :, AIS, 2] %= 2.0 * math.pi
     size = np.full((seeds, steps, 2), 10.0)
     for i, name in enumerate(("radar", "lidar")):
         r = s[name]
@@ -312,3 +314,199 @@ def anees(error, P):
     """Average normalised estimation error squared per state [4], and the share within the 95 % gate."""
     value = np.einsum("...i,...i", error, np.linalg.solve(unpack(P), error[..., None])[..., 0])
     return value.mean(axis=(0, 1)) / 5.0, (value < 11.07).mean(axis=(0, 1))
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """The reference configuration: 200 seeds of the thesis's manoeuvre at 100 m, a measurement of each sensor every 2 s."""
+    error, _, radius = study(np.random.default_rng(1), sensors(), sinusoid(200, 151, 2.0), 2.0)
+    return error[:, 25:].std(axis=1), radius[:, 25:].std(axis=1)
+
+
+def test_reference_configuration(reference):
+    deviation, radius = reference
+    median = np.median(deviation, axis=0)[:, [1, 0, 2, 3]] / [1.0, 1.0, DEG, 1.0]
+    expected = [[1.90, 1.88, 1.57, 0.092], [2.24, 2.23, 5.79, 0.090], [0.225, 0.225, 1.01, 0.023], [0.210, 0.212, 0.974, 0.019]]
+    np.testing.assert_allclose(median, expected, rtol=0.15)  # E, N [m], psi [deg], u [m/s] of AIS, radar, LiDAR, fusion
+    np.testing.assert_allclose(np.median(radius, axis=0), [0.219, 0.022, 0.022], rtol=0.25)
+
+
+def test_fusion_follows_the_best_sensor(reference):
+    deviation = reference[0][:, :, :4]
+    ratio = (deviation[:, FUSED] / deviation[:, :FUSED].min(axis=1)).max(axis=1)
+    assert (ratio <= 1.05).mean() >= 0.85
+    assert (ratio <= 1.10).mean() >= 0.97
+    assert (ratio < 1.0).mean() >= 0.60
+    assert (deviation[:, :FUSED, :2].argmin(axis=1) == LIDAR).all(axis=1).mean() >= 0.99
+    assert (deviation[:, :FUSED, 2].argmax(axis=1) == RADAR).mean() >= 0.99
+
+
+def test_heading_across_north(reference):
+    runs = [
+        study(np.random.default_rng(1), sensors(), sinusoid(200, 151, 2.0, mean=0.0), 2.0, wrapped)[0] for wrapped in (True, False)
+    ]
+    np.testing.assert_allclose(runs[0], runs[1], rtol=0.0, atol=1e-8)
+    across = np.median(runs[0][:, 25:].std(axis=1), axis=0)
+    np.testing.assert_allclose(across[:, 2:4], np.median(reference[0], axis=0)[:, 2:4], rtol=0.05)
+
+
+def test_local_filters_are_consistent_and_simple_fusion_is_not():
+    """Documents the defect of the rule (module ``fusion``), and that Carlson's inflation cures it."""
+    s = sensors()
+    s["process_u"], s["process_r"] = 3e-7, 1.5e-10  # a calm ship: what the sensors have in common matters more
+    truth = matched(np.random.default_rng(2), s, 400, 151, 2.0)
+    ratio, inside = anees(*(a[:, 25:] for a in study(np.random.default_rng(3), s, truth, 2.0)[:2]))
+    assert (np.abs(ratio[:FUSED] - 1.0) < 0.1).all(), ratio
+    assert (inside[:FUSED] > 0.92).all(), inside
+    assert ratio[FUSED] > 1.25
+    assert inside[FUSED] < 0.90
+    s["inflation"] = 3.0
+    ratio, inside = anees(*(a[:, 25:] for a in study(np.random.default_rng(3), s, truth, 2.0)[:2]))
+    assert 0.75 < ratio[FUSED] < 1.15
+    assert inside[FUSED] > 0.92
+
+
+@pytest.mark.parametrize("h", [0.1, 2.0])
+def test_an_hour_with_a_fast_bias(h):
+    """The bias of the LiDAR lives for 0.1 s; an Euler step of 2 s would multiply it by -19."""
+    rng, s = np.random.default_rng(4), sensors()[()]
+    x, P = np.zeros(NX_SCAN), np.zeros(NP_SCAN)
+    ekf.init_scan_motion(x, P, 0.0, 0.0, 1.0, 1.0, 5.0, 0.0, 0.1, 1.0, 1e-4, s, s["lidar"])
+    for k in range(1, int(3600 / h) + 1):
+        z = 5.0 * k * h * np.array([math.cos(1.0), math.sin(1.0)]) + 0.33 * rng.normal(size=2)
+        step(LIDAR, x, P, h, z, 1.0, s)
+    assert np.hypot(x[0] - 18000.0 * math.cos(1.0), x[1] - 18000.0 * math.sin(1.0)) < 1.0
+    assert np.linalg.eigvalsh(unpack(P)).min() > 0.0
+    assert (abs(x[7]), P[35]) < (1.0, 0.01)
+
+
+# --- (4) phases ------------------------------------------------------------------------------------------------------
+@inner
+def follow(s, scan, h, f, z, x, P, phase):
+    """Track fixes z [S, T, 2]; write x [S, T, 9], P [S, T, 45] and phase [S, T]."""
+    y, C, start = np.empty(9), np.empty(45), np.empty(10)
+    for k in range(z.shape[0]):
+        now = 0
+        for t in range(z.shape[1]):
+            now = tracker.track_scan(y, C, start, now, h, z[k, t, 0], z[k, t, 1], f, s, scan)
+            x[k, t] = y
+            P[k, t] = C
+            phase[k, t] = now
+
+
+def scans(rng, name, seeds, minutes, h, f, speed):
+    """Radar or LiDAR alone on targets of constant speed and random heading: truth, x, P, phase."""
+    s, steps = sensors(), int(minutes * 60.0 / h)
+    psi = rng.uniform(0.0, 2.0 * math.pi, (seeds, 1))
+    path = np.asarray(speed) * h * np.arange(steps)
+    truth = np.stack(np.broadcast_arrays(path * np.cos(psi), path * np.sin(psi), psi, speed + 0.0 * path, 0.0), axis=-1)
+    shape = (seeds, steps, 2)
+    scan = s[name]
+    bias = gauss_markov(rng, shape, scan["bias"][0], scan["bias_time"][0], h)
+    z = truth[..., :2] + f * (rng.normal(size=shape) * scan["noise"][0] + bias)
+    x, P, phase = np.empty((seeds, steps, 9)), np.empty((seeds, steps, 45)), np.empty((seeds, steps), np.int8)
+    follow(s[()], s[()][name], h, f, z, x, P, phase)
+    return truth, x, P, phase, z
+
+
+@pytest.mark.parametrize(("f", "reversed_at_most"), [(1.0, 0.0), (10.0, 0.01)])
+def test_radar_alone_finds_the_direction(f, reversed_at_most):
+    truth, x, P, phase, z = scans(np.random.default_rng(6), "radar", 200, 5.0, 2.5, f, 5.0)
+    off = np.abs((x[..., 2] - truth[..., 2] + math.pi) % (2.0 * math.pi) - math.pi)
+    moving = phase == PHASE_MOTION
+    assert moving[:, -1].all()
+    first = moving.argmax(axis=1)
+    rows = np.arange(200)
+    assert (off[rows, first] > math.pi / 2).mean() <= reversed_at_most
+    assert (off[:, -1] > math.pi / 2).mean() <= reversed_at_most
+    displaced = np.hypot(*(z[rows, first] - z[:, 0]).T)
+    assert (displaced > 3.0 * f * math.sqrt(2.0 * 12.5)).all()
+    assert np.median(first) * 2.5 <= (10.0 if f == 1.0 else 40.0)
+    unknown = phase == PHASE_POSITION
+    assert (x[unknown][:, 2:7] == 0.0).all()
+    assert (unpack(P[unknown])[:, 2:7] == 0.0).all()
+    square = ((x[..., :2] - truth[..., :2]) ** 2).sum(axis=-1)
+    assert 0.5 < (square / (P[..., 0] + P[..., 2]))[unknown].mean() < 2.0
+    late = moving & (np.arange(120) > first[:, None] + 8)
+    error = x[late][:, :5] - truth[late]
+    error[:, 2] = (error[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+    nees = np.einsum("...i,...i", error, np.linalg.solve(unpack(P[late][:, :15]), error[..., None])[..., 0]) / 5.0
+    assert nees.mean() < 1.2
+
+
+@pytest.mark.parametrize(("name", "h", "f", "minutes"), [("radar", 2.5, 1.0, 60.0), ("radar", 2.5, 10.0, 60.0), ("lidar", 1.0, 0.5, 20.0)])
+def test_an_iceberg_stays_unknown(name, h, f, minutes):
+    truth, x, P, phase, _ = scans(np.random.default_rng(7), name, 100, minutes, h, f, 0.0)
+    starts = ((phase[:, 1:] == PHASE_MOTION) & (phase[:, :-1] == PHASE_POSITION)).sum()
+    assert starts / (100 * minutes / 60.0) <= 0.1
+    assert (phase == PHASE_MOTION).mean() < 1e-3
+    square = ((x[:, -1, :2] - truth[:, -1, :2]) ** 2).sum(axis=-1)
+    fix = math.sqrt(2.0) * f * math.hypot(*(sensors()[name][k][0] for k in ("noise", "bias")))
+    assert math.sqrt(square.mean()) < 0.25 * fix  # averaged
+    assert 0.6 < (square / (P[:, -1, 0] + P[:, -1, 2])).mean() < 1.6
+
+
+def test_a_ship_that_stops_is_unknown_again():
+    speed = np.where(np.arange(240) < 100, 5.0, 0.0)
+    s = sensors()
+    scan = s["radar"]
+    rng = np.random.default_rng(8)
+    z = np.zeros((50, 240, 2))
+    z[..., 0] = np.cumsum(speed) * 2.5
+    bias = gauss_markov(rng, z.shape, scan["bias"][0], scan["bias_time"][0], 2.5)
+    z += rng.normal(size=z.shape) * scan["noise"][0] + bias
+    x, P, phase = np.empty((50, 240, 9)), np.empty((50, 240, 45)), np.empty((50, 240), np.int8)
+    follow(s[()], s[()]["radar"], 2.5, 1.0, z, x, P, phase)
+    assert (phase[:, 99] == PHASE_MOTION).all()
+    assert (phase[:, -1] == PHASE_POSITION).mean() >= 0.95
+
+
+def test_fold_keeps_the_covariance_of_the_same_motion():
+    rng = np.random.default_rng(9)
+    x = rng.normal(size=9)
+    x[3] = -2.0
+    full = random_covariance(rng, np.ones(9))
+    y, P = x.copy(), pack(full)
+    tracker.fold(y, P)
+    sign = np.array([1, 1, 1, -1, 1, -1, 1, 1, 1])
+    np.testing.assert_allclose(y, sign * x + math.pi * (np.arange(9) == 2))
+    np.testing.assert_allclose(unpack(P), full * np.outer(sign, sign))
+
+
+def test_first_ais_messages():
+    s = sensors()[()]
+    x, P = np.zeros(NX_AIS), np.zeros(NP_AIS)
+    nan = math.nan
+    phase = tracker.track_ais(x, P, PHASE_NONE, 0.0, 10.0, 20.0, nan, nan, nan, s)  # an aid to navigation
+    assert phase == PHASE_POSITION
+    phase = tracker.track_ais(x, P, phase, 10.0, 12.0, 20.0, nan, nan, nan, s)
+    assert phase == PHASE_POSITION
+    assert 10.0 < x[0] < 12.0
+    assert P[0] < 10.0
+    phase = tracker.track_ais(x, P, phase, 10.0, 12.0, 20.0, 1.0, 5.0, nan, s)
+    assert phase == PHASE_MOTION
+    np.testing.assert_allclose(x[:5], [12.0, 20.0, 1.0, 5.0, 0.0])
+    full = unpack(P)
+    assert np.linalg.eigvalsh(full).min() > 0.0
+    # the first message and the bias: what the message says of x + b is as good as its white noise
+    for i, field in ((0, 0), (1, 1), (2, 2), (3, 4)):
+        total = full[i, i] + 2.0 * full[i, 7 + i] + full[7 + i, 7 + i]
+        assert total == pytest.approx(s["ais_noise"][field] ** 2)
+    phase = tracker.track_ais(x, P, phase, 10.0, nan, nan, nan, nan, nan, s)  # nothing usable: a prediction
+    np.testing.assert_allclose(x[:2], [12.0 + 50.0 * math.cos(1.0), 20.0 + 50.0 * math.sin(1.0)])
+
+
+def test_copies_leave_the_filter_alone():
+    s = sensors()[()]
+    x, P = np.zeros(NX_SCAN), np.zeros(NP_SCAN)
+    ekf.init_scan_motion(x, P, 0.0, 0.0, 1.0, 1.0, 5.0, 0.0, 0.1, 1.0, 1e-4, s, s["radar"])
+    before = x.copy(), P.copy()
+    X, Q = np.zeros(7), np.zeros(28)
+    tracker.predicted(x, P, PHASE_MOTION, 3.0, s, X, Q)
+    np.testing.assert_array_equal((x, P)[0], before[0])
+    np.testing.assert_array_equal(P, before[1])
+    ekf.predict_scan(x, P, 3.0, s, s["radar"])
+    np.testing.assert_array_equal(X, x[:7])
+    np.testing.assert_array_equal(Q, P[:28])
+    tracker.predicted(x, P, PHASE_POSITION, 3.0, s, X, Q)
+    np.testing.assert_array_equal(Q, P[:28])

@@ -183,8 +183,10 @@ def parse_yaml(text: str, name: str, directory: Path | None = None) -> Document:
     return Document(name, data, {path: f"{name}:{line}" for path, line in lines.items()}, directory)
 
 
-def locate(kind: str, name: str, directory: Path | None = None) -> Path:
-    """File of a configuration: a name that ships in ``configs/<kind>``, or a path to a YAML file.
+def locate(kind: str, name: str, directory: Path | None = None, *, what: str = "") -> Path:
+    """File of a configuration: a name that ships in ``configs/<kind>``, or a path, first looked for in ``directory``.
+
+    ``what`` is what the error calls it; default: ``kind`` without its plural s.
 
     Raises
     ------
@@ -194,13 +196,13 @@ def locate(kind: str, name: str, directory: Path | None = None) -> Path:
     names = shipped(kind)
     if name in names:
         return names[name]
-    singular = kind.removesuffix("s")
+    what = what or kind.removesuffix("s")
     if Path(name).suffix in (".yaml", ".yml"):
         for path in ([directory / name] if directory else []) + [Path(name)]:
             if path.is_file():
                 return path
-        raise ConfigError(f"{singular} file {name!r}: no such file")
-    raise ConfigError(f"unknown {singular} {name!r}{suggestion(name, names)}")
+        raise ConfigError(f"{what} file {name!r}: no such file")
+    raise ConfigError(f"unknown {what} {name!r}{suggestion(name, names)}")
 
 
 def validate(model: type[ModelT], document: Document) -> ModelT:
@@ -231,10 +233,10 @@ _EXPECTED = {
     "tuple_type": "expected a list",
     "list_type": "expected a list",
     "finite_number": "expected a finite number",
-    "greater_than": "expected a number greater than {gt:g}",
-    "greater_than_equal": "expected a number of at least {ge:g}",
-    "less_than": "expected a number less than {lt:g}",
-    "less_than_equal": "expected a number of at most {le:g}",
+    "greater_than": "expected a number greater than {gt:.12g}",
+    "greater_than_equal": "expected a number of at least {ge:.12g}",
+    "less_than": "expected a number less than {lt:.12g}",
+    "less_than_equal": "expected a number of at most {le:.12g}",
     "too_long": "expected at most {max_length} items",
     "too_short": "expected at least {min_length} items",
     "literal_error": "expected {expected}",

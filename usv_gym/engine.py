@@ -99,3 +99,10 @@ def advance_worlds(worlds, ticks, rows):
     for b in range(worlds.shape[0]):
         for k in range(ticks):
             tick_world(worlds[b], rows, k)
+
+
+@kernel
+def settle_traffic(worlds):
+    """Bring the traffic of every world to its present tick (between frames it lags behind)."""
+    for b in range(worlds.shape[0]):
+        move_traffic(worlds[b], worlds[b].tick)

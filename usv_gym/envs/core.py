@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config import ConfigError
-from ..scenarios.build import build_worlds
+from ..config import ConfigError, Document, validate
+from ..scenarios.build import build_worlds, write_weather
 from ..scenarios.loader import Source, load_scenario
-from ..scenarios.schema import Scenario
+from ..scenarios.schema import Scenario, Weather
 from ..tasks.task import (
     N_TERMS,
     OUTCOMES,
@@ -186,10 +186,7 @@ class Core:
             weather = "random"
         original = self.scenario.preset == "original"
         if isinstance(weather, Mapping):
-            from ..scenarios.build import write_weather
-            from ..scenarios.schema import Weather
-
-            write_weather(self.worlds, b, Weather.model_validate(weather), self.scenario.preset)
+            write_weather(validate(Weather, Document("weather", dict(weather))), self.worlds[b], self.scenario.preset)
             return
         if weather == "calm":
             set_weather(self.worlds[b], original=original)
@@ -224,6 +221,20 @@ class Core:
 
         observe_batch(self.worlds, self.task, self.obs)
         return self.obs
+
+    def scales(self) -> dict[str, float]:
+        """What turns observations and actions into SI units: the scales of the task and facts of the vessel."""
+        config = self.config
+        return {
+            "max_speed": self.model.max_speed,
+            "cruise_speed": self.model.cruise_speed,
+            "length": self.model.length,
+            "beam": self.model.beam,
+            "control_interval": self.control_interval,
+            "channels": self.actions.shape[1],
+            **{name: getattr(config, name) for name in (
+                "range_scale", "distance_scale", "cross_track_scale", "target_speed_scale", "radius_scale", "rate_scale")},
+        }  # fmt: skip
 
     def info(self, b: int) -> dict[str, Any]:
         """The info dict of row b after a step."""

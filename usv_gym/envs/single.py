@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scenarios.commands import Commands
 from ..scenarios.loader import Source
 from ..tasks.task import TaskConfig, unflatten
 from .core import Core, check_weather
@@ -111,7 +112,8 @@ class USVEnv(gym.Env[Any, Any]):
         self.observation_space = self.core.observation_space
         self._discrete = self.core.action_name == "discrete"
         self._started = False
-        self._trail: list[tuple[float, ...]] = []
+        self._commands: Commands | None = None
+        self._history: Any = None
 
     def _observation(self) -> Any:
         flat = self.core.obs[0]
@@ -124,8 +126,9 @@ class USVEnv(gym.Env[Any, Any]):
         with compiling():
             self.core.reset(_ONE, [self.np_random])
         self.core.terms[0] = 0.0
+        self._commands = self._history = None
         self._started = True
-        return self._observation(), self.core.info(0)
+        return self._observation(), {**self.core.info(0), "scales": self.core.scales()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance by one control interval.
@@ -153,9 +156,20 @@ class USVEnv(gym.Env[Any, Any]):
         if self.render_mode is None:
             warnings.warn("render() needs a render_mode; pass render_mode='rgb_array' to gym.make", stacklevel=2)
             return None
-        from ..render import render_world
+        from ..render.pygame_view import render
+        from ..render.scene import History, scene_from_snapshot
 
-        return render_world(self.core.worlds[0], self.core.names)
+        if self._history is None:
+            self._history = History()
+        names = self._commands.names if self._commands else self.core.names
+        return render(scene_from_snapshot(self.core.worlds[0], names, self._history), size=(800, 800))
+
+    @property
+    def commands(self) -> Commands:
+        """Commands to the running world: spawn, delete, move, set_waypoints, set_ais; and its notices."""
+        if self._commands is None:
+            self._commands = Commands(self.core.worlds, 0, list(self.core.names), self.core.scenario)
+        return self._commands
 
     @property
     def world(self) -> Any:

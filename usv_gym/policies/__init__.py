@@ -1,0 +1,32 @@
+"""Controllers that ship with the package, by name."""
+
+from __future__ import annotations
+
+from ..config import ConfigError, suggestion
+from .base import Controller
+from .baselines import Avoid, Idle, Waypoints
+
+POLICIES: dict[str, tuple[type, str]] = {
+    "waypoints": (Waypoints, "line-of-sight guidance along the route; sees no traffic"),
+    "avoid": (Avoid, "the same, going around what the TDM reports; an honest reactive baseline"),
+    "idle": (Idle, "no thrust"),
+}
+#: drives the actuators from a recorded mission; needs no observation, so it is no controller
+THRUST_LOG = "thrust-log"
+
+
+def make_policy(name: str) -> Controller:
+    """A built-in controller by name.
+
+    Raises
+    ------
+    ConfigError
+        if there is none of that name.
+    """
+    if name not in POLICIES:
+        raise ConfigError(f"unknown policy {name!r}{suggestion(name, [*POLICIES, THRUST_LOG])}")
+    controller: Controller = POLICIES[name][0]()
+    return controller
+
+
+__all__ = ["POLICIES", "THRUST_LOG", "Controller", "make_policy"]

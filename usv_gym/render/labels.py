@@ -37,6 +37,7 @@ class Request:
     clearance: float = 0.0
     priority: float = 0.0
     fixed: bool = False
+    far: float = 90.0  # [px] left out rather than moved further away than this
 
 
 @dataclass(frozen=True)
@@ -98,12 +99,13 @@ def _candidates(request: Request) -> tuple[Boxes, NDArray[np.float64]]:
     x, y = request.anchor
     if request.fixed:
         return np.array([(x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h)]), np.zeros(1)
-    reach = request.clearance + GAP + _DISTANCES[:, None]
+    distances = _DISTANCES[request.far >= _DISTANCES, None]
+    reach = request.clearance + GAP + distances
     # the box touches the circle of `reach`: its centre is further out by its own half extent in that direction
     cx = x + reach * _DIRECTIONS[:, 0] + 0.5 * w * np.clip(_DIRECTIONS[:, 0] * 1.5, -1.0, 1.0)
     cy = y + reach * _DIRECTIONS[:, 1] + 0.5 * h * np.clip(_DIRECTIONS[:, 1] * 1.5, -1.0, 1.0)
     boxes = np.stack((cx - 0.5 * w, cy - 0.5 * h, cx + 0.5 * w, cy + 0.5 * h), axis=-1).reshape(-1, 4)
-    return boxes, (0.45 * _DISTANCES[:, None] + _PREFERENCE).ravel()
+    return boxes, (0.45 * distances + _PREFERENCE).ravel()
 
 
 def _overlap(boxes: Boxes, others: Boxes) -> NDArray[np.float64]:

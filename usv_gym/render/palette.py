@@ -101,7 +101,6 @@ STYLES: dict[str, Style] = {
     "collision":      _style("- #d1001f",         "- #ff3b4e",         "- #d04030", 3.0),
     "label_vessel":   _style("#d7ebf0 #12181c",   "#0a0d10 #e6edf0",   "#070504 #c98a62"),
     "label_fixed":    _style("#d7ebf0 #465861",   "#0a0d10 #a9b8c0",   "#070504 #8f6047"),
-    "label_own":      _style("#d7ebf0 #12181c",   "#0a0d10 #ffe27a",   "#070504 #d49a55"),
     "leader":         _style("- #7c8e97",         "- #6f7d85",         "- #60402f"),
     # panel
     "panel":          _style("#cbdfe5 #8fa3ab",   "#15191c #3d474d",   "#0b0807 #38231a"),

@@ -6,7 +6,7 @@ Points are ``[n, 2]`` float arrays of north, east [m].
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -130,7 +130,6 @@ class Scene:
     layers: dict[str, list[Primitive]]
     panel: Panel
     extent: tuple[float, float, float, float]  # south, north, west, east [m]
-    info: dict[str, Any] = field(default_factory=dict)
 
     def all(self, kind: type[Any] | None = None, role: str | None = None) -> list[Any]:
         """Primitives of one type and role, in drawing order (for tests and for other renderers)."""

@@ -25,6 +25,8 @@ from .primitives import LAYERS, Circle, Dots, Label, Points, Polygon, Polyline, 
 from .shapes import nice_step
 
 SIZES = (12, 11)  #: [px] of the first and the second line of a label
+IMPORTANT = 4.0  #: labels of this priority are moved far before they are left out
+BARE = 200  #: [px] a map smaller than this has no text: it could not be read
 SMALL = 11  #: [px] text of the grid and of the scale
 
 
@@ -133,8 +135,9 @@ class _Map:
             if name not in ("shadows", "labels"):
                 for primitive in layers.get(name, []):
                     self._primitive(primitive, name in ("obstacles", "vessels", "own"))
-        plates = self._furniture()
-        self._labels([p for p in layers.get("labels", []) if isinstance(p, Label)], plates)
+        if min(self.width, self.height) >= BARE:
+            plates = self._furniture()
+            self._labels([p for p in layers.get("labels", []) if isinstance(p, Label)], plates)
 
     def px(self, points: Points) -> Points:
         """Metres {n} to pixels, [n, 2]."""
@@ -176,7 +179,7 @@ class _Map:
         for k in range(math.ceil((view.north - half_n) / step), math.floor((view.north + half_n) / step) + 1):
             y = self._at((k * step, 0.0))[1]
             self.canvas.polyline(np.array([(0.0, y), (w, y)]), "grid")
-            if 70.0 < y < h - 70.0:
+            if min(w, h) >= BARE and 70.0 < y < h - 70.0:
                 self.canvas.text(f"N {k * step:.0f}", (5.0, y - 13.0), "text_muted", SMALL, halo=True)
         for k in range(math.ceil((view.east - half_e) / step), math.floor((view.east + half_e) / step) + 1):
             x = self._at((0.0, k * step))[0]
@@ -189,13 +192,11 @@ class _Map:
         boxes = [self._scale_bar(), self._north_arrow()]
         if self.title:
             boxes.append(self._title())
-        if self.height > 140:  # the coordinates along the edges
-            w, h = float(self.width), float(self.height)
-            boxes += [(0.0, 0.0, 42.0, h), (0.0, h - 18.0, w, h)]
-        return boxes
+        w, h = float(self.width), float(self.height)
+        return [*boxes, (0.0, 0.0, 42.0, h), (0.0, h - 18.0, w, h)]  # coordinates stand along these edges
 
     def _scale_bar(self) -> Box:
-        c, step = self.canvas, self.step
+        c, step = self.canvas, nice_step(self.width / self.view.scale, 20.0)
         parts = 2 if 4.0 * step * self.view.scale > 0.35 * self.width else 4
         length = parts * step * self.view.scale
         x, y = 22.0, self.height - 24.0
@@ -204,7 +205,7 @@ class _Map:
         for k in range(parts):
             left, right = x + k * length / parts, x + (k + 1) * length / parts
             c.box((left, y, right, y + 5.0), "scale" if k % 2 == 0 else "scale_gap")
-        for k in range(parts + 1):
+        for k in (0, parts // 2, parts):
             text = f"{k * step:g}" + (" m" if k == parts else "")
             shift = 0.5 * text_size(f"{k * step:g}", SMALL)[0]
             c.text(text, (x + k * length / parts - shift, y - 16.0), "text", SMALL)
@@ -251,7 +252,8 @@ class _Map:
         sizes = [text_size(text, size) for text, size in zip(label.lines, SIZES, strict=False)]
         size = (max(w for w, _ in sizes) + 2.0, sum(h for _, h in sizes) + 1.0)
         clearance = max(label.clearance * self.view.scale, 7.0)
-        return Request(size, self._at(label.anchor), clearance, label.priority, label.fixed)
+        far = 90.0 if label.priority >= IMPORTANT else 20.0
+        return Request(size, self._at(label.anchor), clearance, label.priority, label.fixed, far)
 
     def _write(self, label: Label, where: Placed) -> None:
         x, y = where.box[0] + 1.0, where.box[1]

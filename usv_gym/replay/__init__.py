@@ -1,0 +1,1 @@
+"""Recording: the episode archive, and what a run leaves behind."""

@@ -238,16 +238,17 @@ def _tdm(episode: Episode) -> dict[str, Any]:
 
 
 def _ais(episode: Episode) -> dict[str, Any]:
-    """Errors of what ships transmitted, next to what the sensor configuration asks for."""
+    """Errors of what others transmitted, next to what the sensor configuration asks for."""
+    reports = episode.ais[episode.ais["source"] != episode.own]
     sensor = episode.meta["sensors"]["ais"]
     design = np.hypot(_floats(sensor["noise"]), _floats(sensor["bias"]))  # of E = b + v, thesis 2.1
     fields = {}
-    for k, (name, error) in enumerate(ais_errors(episode.ais).items()):
+    for k, (name, error) in enumerate(ais_errors(reports).items()):
         unit, size = _AIS_UNITS[name]
         scaled = Statistic(error.count, error.mean / size, error.std / size, error.rms / size)
         variance = {f"design_std_{unit}": design[k] / size, f"design_variance_{unit}2": (design[k] / size) ** 2}
         fields[name] = {**_with_unit(scaled, unit), f"variance_{unit}2": scaled.std**2, **variance}
-    return {"messages_count": len(episode.ais), "errors": fields}
+    return {"messages_count": len(reports), "errors": fields}
 
 
 def _floats(values: Any) -> Floats:

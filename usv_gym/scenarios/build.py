@@ -13,7 +13,7 @@ from ..units import DEG, DEG_PER_MIN, KNOT, metres_per_degree
 from ..world import state
 from ..world.disturbance import set_weather
 from ..world.vessel import load_vessel, write_plant
-from .schema import OWN_SHIP, GeoPoint, Scenario
+from .schema import OWN_SHIP, GeoPoint, Preset, Scenario, Weather
 from .sensor_schema import Error, Lidar, Radar, Sensors
 
 Worlds: TypeAlias = np.ndarray[Any, np.dtype[Any]]
@@ -93,7 +93,7 @@ def write_world(
         )
     worlds[b] = np.zeros((), worlds.dtype)
     time = scenario.simulation
-    w["dt_us"], w["dt"] = time.dt_us, time.dt_us * 1e-6
+    w["dt_us"], w["dt"] = time.dt_us, time.dt_us / 1e6
     w["frame_ticks"] = time.frame_ticks
     w["seed"] = seed
     w["origin"] = scenario.origin.latitude_deg, scenario.origin.longitude_deg
@@ -101,21 +101,21 @@ def write_world(
     w["epoch_us"] = round(time.epoch.timestamp() * 1e6)
     w["area"][0] = time.area or 0.0
     w["observer"] = range(w["observer"].shape[0]) if observers is None else observers
-    _write_weather(scenario, w)
+    write_weather(scenario.weather, w, scenario.preset)
     mmsis = scenario.mmsis()
     _write_own_ship(scenario, worlds, b, mmsis[OWN_SHIP])
     for j, name in enumerate(scenario.ships, start=1):
-        _write_ship(scenario, w, j, name, mmsis[name])
+        write_ship(scenario, w, j, name, mmsis[name])
     for i, name in enumerate(scenario.obstacles):
-        _write_obstacle(scenario, w, i, name, mmsis[name])
+        write_obstacle(scenario, w, i, name, mmsis[name])
     for group, frame, now in (("vessels", "frame_eta", "eta"), ("obstacles", "frame_position", "position")):
         w[group][frame] = w[group][now]
     _write_sensors(scenario.sensors, w["sensors"])
     _write_nothing_yet(w)
 
 
-def _write_weather(scenario: Scenario, w: Any) -> None:
-    weather = scenario.weather
+def write_weather(weather: Weather, w: Any, preset: Preset) -> None:
+    """Write a weather into a record; the next reset starts it."""
     set_weather(
         w,
         wind_speed=weather.wind.speed,
@@ -125,7 +125,7 @@ def _write_weather(scenario: Scenario, w: Any) -> None:
         wave_height=weather.waves.height,
         wave_to=_reverse(weather.waves.from_deg),
         gusts=weather.wind.gusts,
-        original=scenario.preset == "original",
+        original=preset == "original",
         radar_range_factor=weather.visibility.radar_range,
         lidar_range_factor=weather.visibility.lidar_range,
         detection_factor=weather.visibility.detection,
@@ -152,7 +152,8 @@ def _write_own_ship(scenario: Scenario, worlds: Worlds, b: int, mmsi: int) -> No
         _write_route(scenario, w["routes"], 0, (own.position, *own.route), own.acceptance_radius, state.AFTER_STOP)
 
 
-def _write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int) -> None:
+def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int) -> None:
+    """Write ship ``name`` of a scenario into the empty vessel slot j of a record."""
     ship = scenario.ships[name]
     v = w["vessels"]
     v["kind"][j], v["model"][j], v["plant"][j] = _SHIP_KINDS[ship.class_], state.MODEL_KINEMATIC, -1
@@ -195,7 +196,8 @@ def _write_route(
     routes["radius"][j], routes["after_last"][j] = radius, after_last
 
 
-def _write_obstacle(scenario: Scenario, w: Any, i: int, name: str, mmsi: int) -> None:
+def write_obstacle(scenario: Scenario, w: Any, i: int, name: str, mmsi: int) -> None:
+    """Write obstacle ``name`` of a scenario into the empty obstacle slot i of a record."""
     obstacle = scenario.obstacles[name]
     m = w["obstacles"]
     m["active"][i], m["kind"][i] = 1, _OBSTACLE_KINDS[obstacle.kind]

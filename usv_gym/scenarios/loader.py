@@ -45,7 +45,7 @@ def load_scenario(
         once, if sensors are faster than the tick: they fire every tick, as in the original.  The rates that the thesis
         itself asks for at its own tick (MRU, IMU and wind) pass silently in native scenarios.
     """
-    document, native = _document(source)
+    document, has_dynamics_file = _document(source)
     document = _named_sensors_as_mapping(document).override(overrides)
     for path, value in ((("own_ship", "vessel"), vessel), (("preset",), preset)):
         if value is not None:
@@ -54,31 +54,35 @@ def load_scenario(
     model = load_vessel(scenario.own_ship.vessel)
     if scenario.own_ship.memory and model.fluid_memory is None:
         raise ConfigError(f"{document.where(('own_ship', 'memory'))}: vessel {model.name!r} has no fluid_memory")
-    _warn_of_fast_sensors(scenario, Scenario() if native else None)
+    _warn_of_fast_sensors(scenario, None if has_dynamics_file else Scenario())
     return scenario
 
 
 def _document(source: Source) -> tuple[Document, bool]:
-    """The data of a native scenario, and whether it was written as one."""
+    """The data of a native scenario, and whether a dynamics file of the thesis asked for its rates."""
     if isinstance(source, Scenario):
-        return Document(source.name or "scenario", source.dump()), True
+        return Document(source.name or "scenario", source.dump()), False
     if isinstance(source, Mapping):
-        return Document("scenario", dict(source)), True
+        return Document("scenario", dict(source)), False
     if not isinstance(source, str | Path):
         paths = list(source)
         if not paths:
             raise ConfigError("scenario: expected a name, a path, paths or a mapping, got an empty list")
-        return _document(paths[0]) if len(paths) == 1 else (read_thesis(paths), False)
+        return _document(paths[0]) if len(paths) == 1 else _converted(read_thesis(paths))
     if Path(source).is_dir():
-        return read_thesis([source]), False
+        return _converted(read_thesis([source]))
     is_file = Path(source).suffix in (".yaml", ".yml") or Path(source).is_file()
     path = Path(source) if is_file else locate("scenarios", str(source))
     document = read_yaml(path)
     if kind_of(document.data) is not None:
-        return convert([document], name=str(path)), False
+        return _converted(convert([document], name=str(path)))
     if not document.data.get("name"):
         document.data["name"] = path.stem
-    return document, True
+    return document, False
+
+
+def _converted(document: Document) -> tuple[Document, bool]:
+    return document, ("simulation",) in document.origins
 
 
 def _named_sensors_as_mapping(document: Document) -> Document:

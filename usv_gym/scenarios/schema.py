@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import (
+    AfterValidator,
     AwareDatetime,
     BeforeValidator,
     Discriminator,
@@ -29,7 +30,7 @@ from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, Sensors
 Latitude = Annotated[float, Field(strict=True, ge=-90, le=90)]
 Longitude = Annotated[float, Field(strict=True, ge=-180, le=180)]
 Direction = Annotated[float, Field(strict=True, ge=-360, le=360)]
-Name = Annotated[str, Field(pattern=r"^[^\s.=](?:[^.=\x00-\x1f]*[^\s.=])?$", max_length=80)]
+
 Preset = Literal["standard", "original"]
 
 MAX_WAYPOINTS = 32  #: that a route in the world record holds
@@ -62,7 +63,16 @@ def class_of_length(length: float) -> str:
     return "ship" if length > 50.0 else "vessel" if length > 15.0 else "boat"
 
 
-# --- places ----------------------------------------------------------------------------------------------------------
+# --- names and places ------------------------------------------------------------------------------------------------
+def _name(value: str) -> str:
+    if not value or value != value.strip() or not value.isprintable() or set(".=") & set(value):
+        raise problem("expected a name without '.' and '=' (overrides need them) and without spaces at its ends")
+    return value
+
+
+Name = Annotated[str, AfterValidator(_name)]
+
+
 class GeoPoint(Model):
     """A place on the globe, WGS-84."""
 

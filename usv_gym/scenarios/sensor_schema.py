@@ -224,7 +224,7 @@ def load_sensors(name: str, directory: Path | None = None) -> Sensors:
     ConfigError
         if there is no such set, or it has mistakes.
     """
-    return validate(Sensors, read_yaml(locate("sensors", name, directory)))
+    return validate(Sensors, read_yaml(locate("sensors", name, directory, what="sensor set")))
 
 
 def expand_sensors(value: Any, info: ValidationInfo) -> Any:

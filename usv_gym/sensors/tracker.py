@@ -34,9 +34,9 @@ from . import ekf
 #: Time constant of forgetting in the line fit [s]
 MEMORY = 60.0
 #: Displacement from the first fix, in standard deviations of two fixes, and speed, in its own, at which motion starts
-DISPLACED, MOVING = 3.0, 4.0
+DISPLACED, MOVING = 3.0, 3.0
 #: Speed of the fit at which "static" has become doubtful: the position then comes from the line
-DOUBTFUL = 2.0
+DOUBTFUL = 1.5
 #: Speed of the filter, in its standard deviations, below which motion is unknown again
 STOPPED = 2.0
 

@@ -12,14 +12,14 @@ _REVERSE_SLOPE = 20.0  # the bucket is all the way over at 5 % of surge demand
 def autopilot(w, p, heading, yaw_rate, speed, heading_ref, speed_ref, h):
     """Demands (surge, yaw), each in [-1, 1], that bring plant p to ``heading_ref`` [rad] and ``speed_ref`` [m/s].
 
-    Heading is a cascade: the wrapped error asks for a yaw rate, limited to ``ap_rate_max``, which a proportional law on the
-    measured ``yaw_rate`` [rad/s] follows, plus an integral against wind that waits while either is at its limit.  Speed
+    Heading is a cascade: the wrapped error asks for a yaw rate, limited to ``ap_rate_max``, which a PI law on the
+    measured ``yaw_rate`` [rad/s] follows; its integral, against wind, waits while rate or demand is at its limit.  Speed
     is the inverse of the steady speed curve plus a PI law, whose integral stands still while the demand is at its limit.
     """
     q = w.plants
-    error = wrap(heading_ref - heading)
-    rate_ref = clip(q.ap_heading[p, 0] * error, -q.ap_rate_max[p], q.ap_rate_max[p])
-    yaw = q.ap_heading[p, 1] * (rate_ref - yaw_rate) + q.ap_integral[p, 0]
+    rate_ref = clip(q.ap_heading[p, 0] * wrap(heading_ref - heading), -q.ap_rate_max[p], q.ap_rate_max[p])
+    error = rate_ref - yaw_rate
+    yaw = q.ap_heading[p, 1] * error + q.ap_integral[p, 0]
     if abs(yaw) < 1.0 and abs(rate_ref) < q.ap_rate_max[p]:
         q.ap_integral[p, 0] = clip(q.ap_integral[p, 0] + q.ap_heading[p, 2] * error * h, -1.0, 1.0)
 

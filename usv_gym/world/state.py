@@ -109,7 +109,7 @@ def _plants(P: int) -> Dtype:
         ("reverse_by_bucket", i1, (P,)),
         # faults, written by scenario events: share of thrust that is left, nozzle held where it is
         ("thrust_left", f8, (P, A)), ("nozzle_stuck", i1, (P, A)),
-        # autopilot: heading error to yaw rate [1/s], rate error to demand [s/rad], integral of heading error [1/(rad s)];
+        # autopilot: heading error to yaw rate [1/s], rate error to demand [s/rad], its integral [1/rad];
         # speed error to demand [s/m], its integral [1/m], exponent of the steady speed curve; speed at full demand
         # [m/s], largest yaw rate asked for [rad/s]
         ("ap_heading", f8, (P, 3)), ("ap_speed", f8, (P, 3)), ("ap_speed_max", f8, (P,)), ("ap_rate_max", f8, (P,)),

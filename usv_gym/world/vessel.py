@@ -162,7 +162,7 @@ class Autopilot(_Model):
 
     heading_gain: Positive
     rate_gain: Positive
-    heading_integral: NonNegative
+    rate_integral: NonNegative
     rate_max_deg_s: Positive
     speed_gain: Positive
     speed_integral: NonNegative
@@ -299,7 +299,7 @@ def write_plant(
         "bucket_in_yaw": not original,
         "euler_actuators": original,
         "reverse_by_bucket": model.reverse_by_bucket,
-        "ap_heading": (pilot.heading_gain, pilot.rate_gain, pilot.heading_integral),
+        "ap_heading": (pilot.heading_gain, pilot.rate_gain, pilot.rate_integral),
         "ap_speed": (pilot.speed_gain, pilot.speed_integral, pilot.speed_curve_exponent),
         "ap_speed_max": model.max_speed, "ap_rate_max": pilot.rate_max_deg_s * DEG,
         "thrusters": len(model.thrusters),
