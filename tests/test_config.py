@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import pickle
+import re
 import subprocess
 import sys
 import textwrap
@@ -261,13 +262,14 @@ def test_suggestions() -> None:
     assert suggestion("zzz", []) == ""
 
 
-# --- YAML --------------------------------------------------------------------------------------------------------------
+# --- YAML -------------------------------------------------------------------------------------------------------------
 def test_scalars_are_those_of_yaml_1_2() -> None:
     data = parse_yaml(
         "{a: off, b: 1e-6, c: 12:30, d: 010, e: 2017-06-01, f: true, g: ~, h: .5, i: -3, j: yes}", "t"
     ).data
     assert data == {
-        "a": "off", "b": 1e-6, "c": "12:30", "d": 10.0, "e": "2017-06-01", "f": True, "g": None, "h": 0.5, "i": -3, "j": "yes"
+        "a": "off", "b": 1e-6, "c": "12:30", "d": 10.0, "e": "2017-06-01", "f": True, "g": None, "h": 0.5, "i": -3,
+        "j": "yes",
     }  # fmt: skip
 
 
@@ -276,7 +278,7 @@ def test_anchors_and_merge_keys_work() -> None:
     assert data["b"] == {"p": 1, "q": 3}
 
 
-# --- overrides -----------------------------------------------------------------------------------------------------------
+# --- overrides --------------------------------------------------------------------------------------------------------
 def test_overrides(tmp_path: Path) -> None:
     scenario = load_scenario(
         write(tmp_path, BASE),
@@ -330,7 +332,7 @@ def test_overrides_are_a_list(tmp_path: Path) -> None:
         load_scenario(write(tmp_path, BASE), vessel="odinn")
 
 
-# --- what ships --------------------------------------------------------------------------------------------------------
+# --- what ships -------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name", shipped("scenarios"))
 def test_shipped_scenarios_load_round_trip_and_build(name: str, tmp_path: Path) -> None:
     scenario = load_scenario(name)
@@ -385,7 +387,7 @@ def test_reading_configuration_needs_no_compiler() -> None:
     subprocess.run([sys.executable, "-c", textwrap.dedent(code)], check=True, cwd=Path(__file__).parent.parent)
 
 
-# --- defaults and derived values ---------------------------------------------------------------------------------------
+# --- defaults and derived values --------------------------------------------------------------------------------------
 def ship(**keys: object):
     return load_scenario({"ships": {"s": {"waypoints": [[0, 0], [100, 0]], **keys}}}).ships["s"]
 
@@ -452,13 +454,15 @@ def test_vessel_files_next_to_the_scenario_survive_a_dump(tmp_path: Path) -> Non
     assert load_scenario(scenario.dump()) == scenario
 
 
-# --- the record --------------------------------------------------------------------------------------------------------
+# --- the record -------------------------------------------------------------------------------------------------------
 def test_everything_reaches_the_record(tmp_path: Path) -> None:
     text = BASE.replace(
         "sensors: thesis",
         "  mark: {kind: lighthouse, position: {latitude_deg: 59.45, longitude_deg: 10.5}, radius: 4, ais: true}\n"
-        "  floe: {position: [9, 9], radius: 3, drift: [0.1, -0.2]}\n  loose: {position: [9, 9], radius: 3, drift: current}\n"
-        "weather: {wind: {speed: 10, from_deg: 90}, current: {speed: 0.5, to_deg: 90}, waves: {height: 2, from_deg: 270}}\n"
+        "  floe: {position: [9, 9], radius: 3, drift: [0.1, -0.2]}\n"
+        "  loose: {position: [9, 9], radius: 3, drift: current}\n"
+        "weather:\n  wind: {speed: 10, from_deg: 90}\n  current: {speed: 0.5, to_deg: 90}\n"
+        "  waves: {height: 2, from_deg: 270}\n"
         "sensors: thesis",
     ).replace("vessel: odin", "vessel: odin\n  heading_deg: 90\n  speed: 2")
     scenario = load_scenario(write(tmp_path, text))
@@ -542,7 +546,7 @@ def test_observers_and_capacity() -> None:
         build_worlds(load_scenario({"obstacles": many}))
 
 
-# --- round trip --------------------------------------------------------------------------------------------------------
+# --- round trip -------------------------------------------------------------------------------------------------------
 number = st.integers(-(10**7), 10**7).map(lambda v: v / 128)
 positive = st.floats(1e-3, 1e3)
 # decimals, so that two places that differ on paper differ on the globe too
@@ -560,7 +564,8 @@ ships = st.builds(
     st.fixed_dictionaries({"waypoints": st.lists(place, min_size=2, max_size=5, unique_by=str)}),
     st.fixed_dictionaries({}, optional={
         "class": st.sampled_from(["ship", "vessel", "boat"]), "length": positive, "beam": positive,
-        "after_last": st.sampled_from(["stop", "continue", "loop"]), "turn_time": positive, "max_turn_rate_deg": positive,
+        "after_last": st.sampled_from(["stop", "continue", "loop"]),
+        "turn_time": positive, "max_turn_rate_deg": positive,
         "turn": st.sampled_from(["lowpass", "constant"]), "ais": st.sampled_from(["A", "B", "off", "auto"]),
     }),
     speed,
@@ -600,3 +605,12 @@ def test_round_trip_through_yaml(data: dict, discs: dict) -> None:
     again = validate(Scenario, parse_yaml(scenario.to_yaml(), "round trip"))
     assert again == scenario
     assert yaml.safe_load(json.dumps(scenario.dump())) is not None
+
+
+def test_every_key_is_documented() -> None:
+    text = (Path(__file__).parent.parent / "docs" / "configuration.md").read_text(encoding="utf-8")
+    text = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+    words = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]+)`", text))))
+    for definition in [json_schema(Scenario), *json_schema(Scenario)["$defs"].values()]:
+        missing = set(definition.get("properties", {})) - words
+        assert not missing, definition["title"]

@@ -110,7 +110,7 @@ def test_steady_and_calm_weather():
 
 
 def test_noise_belongs_to_the_world():
-    weather = dict(wind_speed=10.0, current_speed=0.5, wave_height=1.0)
+    weather = {"wind_speed": 10.0, "current_speed": 0.5, "wave_height": 1.0}
     a, b, c = (simulate(make_world(seed=s, **weather), 5.0) for s in (3, 3, 4))
     np.testing.assert_array_equal(a, b)
     assert not np.allclose(a, c)

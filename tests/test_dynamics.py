@@ -84,7 +84,8 @@ def test_end_point_of_thrust_log_a():
     ("rpm", "speed"), [(0, 1.16), (10, 1.75), (25, 2.64), (50, 4.14), (61, 4.81), (75, 5.66), (100, 7.18)]
 )
 def test_steady_speed(rpm, speed):
-    assert simulate(make_world(preset="original"), 120, command=jets(rpm / 100))[-1, 3] == pytest.approx(speed, rel=0.03)
+    out = simulate(make_world(preset="original"), 120, command=jets(rpm / 100))
+    assert out[-1, 3] == pytest.approx(speed, rel=0.03)
 
 
 def test_astern_neutral_and_bow_thruster():
@@ -161,8 +162,8 @@ angles = st.floats(-3.1, 3.1)
 fast = settings(max_examples=25, deadline=None)
 
 
-def sail(vessel="odin", preset="standard", surge=0.5, yaw=0.3, start=(0.0, 0.0, 0.0), nu=(2.0, 0.2, 0.1), seconds=20, **kw):
-    worlds = make_world(vessel, preset, **kw)
+def sail(vessel, surge=0.5, yaw=0.3, start=(0.0, 0.0, 0.0), nu=(2.0, 0.2, 0.1), seconds=20, **kw):
+    worlds = make_world(vessel, **kw)
     worlds["vessels"]["eta"][0, 0] = start
     worlds["vessels"]["nu"][0, 0] = nu
     demand(worlds, surge, yaw)
@@ -173,7 +174,8 @@ def sail(vessel="odin", preset="standard", surge=0.5, yaw=0.3, start=(0.0, 0.0, 
 @given(vessel=st.sampled_from(VESSELS), surge=demands, yaw=demands, wind=angles, current=angles)
 def test_port_starboard_mirror(vessel, surge, yaw, wind, current):
     def weather(side):
-        return dict(wind_speed=8.0, wind_to=side * wind, current_speed=0.4, current_to=side * current, gusts=False)
+        means = {"wind_speed": 8.0, "wind_to": side * wind, "current_speed": 0.4, "current_to": side * current}
+        return {**means, "gusts": False}
 
     a = sail(vessel, surge=surge, yaw=yaw, nu=(1.0, 0.2, 0.1), **weather(1.0))
     b = sail(vessel, surge=surge, yaw=-yaw, nu=(1.0, -0.2, -0.1), **weather(-1.0))
@@ -184,7 +186,8 @@ def test_port_starboard_mirror(vessel, surge, yaw, wind, current):
 @given(vessel=st.sampled_from(VESSELS), turn=angles, north=st.floats(-500, 500), east=st.floats(-500, 500), yaw=demands)
 def test_rotation_and_translation(vessel, turn, north, east, yaw):
     def weather(by):
-        return dict(wind_speed=8.0, wind_to=by, current_speed=0.4, current_to=1.0 + by, wave_height=0.5, wave_to=2.0 + by)
+        to = {"wind_to": by, "current_to": 1.0 + by, "wave_to": 2.0 + by}
+        return {"wind_speed": 8.0, "current_speed": 0.4, "wave_height": 0.5, **to}
 
     a = sail(vessel, yaw=yaw, memory=vessel == "odin", **weather(0.0))
     b = sail(vessel, yaw=yaw, start=(north, east, turn), memory=vessel == "odin", **weather(turn))
@@ -202,7 +205,7 @@ def test_uniform_current_only_carries(vessel, to, speed, yaw):
     current = speed * np.array([np.cos(to), np.sin(to)])
 
     def track(moving):
-        kw = dict(current_speed=speed, current_to=to, gusts=False) if moving else {}
+        kw = {"current_speed": speed, "current_to": to, "gusts": False} if moving else {}
         worlds = make_world(vessel, **kw)
         worlds["plants"]["area_side"] = 0.0
         worlds["vessels"]["nu"][0, 0, :2] = current if moving else 0.0
@@ -229,10 +232,8 @@ def test_no_energy_gained_unforced(vessel, u, v, r):
     worlds["vessels"]["nu"][0, 0] = u * model.max_speed, v * model.max_speed, r * model.max_speed / model.length
     nu = np.vstack([worlds["vessels"]["nu"][0, 0].copy(), simulate(worlds, 20)[:, 3:]])
     energy = 0.5 * np.einsum("ti,ij,tj->t", nu, model.mass.matrix(), nu)
-    if model.coriolis.form == "linearised":  # this form does a little work on its own, but never adds up
-        assert energy.max() <= 1.02 * energy[0] + 1e-9
-        assert energy[-1] <= energy[0] + 1e-9
-    else:
+    assert energy.max() <= energy[0] + 1e-9
+    if model.coriolis.form != "linearised":  # which does a little work on its own, less than damping takes
         assert np.all(np.diff(energy) <= 1e-9)
 
 

@@ -7,7 +7,7 @@ import pytest
 from filterpy.kalman import ExtendedKalmanFilter
 
 from usv_gym.jit import inner
-from usv_gym.sensors import ekf, fusion, tracker
+from usv_gym.sensors import ekf, fusion, motion, tracker
 from usv_gym.world.state import NP_AIS, NP_SCAN, NX_AIS, NX_SCAN, PHASE_MOTION, PHASE_NONE, PHASE_POSITION, world_dtype
 
 DEG = math.pi / 180.0
@@ -94,7 +94,7 @@ class Oracle(ExtendedKalmanFilter):
         self.x = self.motion(self.x, self.h)
 
     def advance(self, h):
-        steps = ekf.substeps(h, self.x[4])
+        steps = motion.substeps(h, self.x[4])
         for _ in range(steps):
             self.h = h / steps
             nudge = 1e-30j * np.eye(self.dim_x)
@@ -318,7 +318,7 @@ def anees(error, P):
 
 @pytest.fixture(scope="module")
 def reference():
-    """The reference configuration: 200 seeds of the thesis's manoeuvre at 100 m, a measurement of each sensor every 2 s."""
+    """Reference configuration: 200 seeds of the thesis's manoeuvre at 100 m, every sensor measures every 2 s."""
     error, _, radius = study(np.random.default_rng(1), sensors(), sinusoid(200, 151, 2.0), 2.0)
     return error[:, 25:].std(axis=1), radius[:, 25:].std(axis=1)
 
@@ -326,7 +326,12 @@ def reference():
 def test_reference_configuration(reference):
     deviation, radius = reference
     median = np.median(deviation, axis=0)[:, [1, 0, 2, 3]] / [1.0, 1.0, DEG, 1.0]
-    expected = [[1.90, 1.88, 1.57, 0.092], [2.24, 2.23, 5.79, 0.090], [0.225, 0.225, 1.01, 0.023], [0.210, 0.212, 0.974, 0.019]]
+    expected = [
+        [1.90, 1.88, 1.57, 0.092],
+        [2.24, 2.23, 5.79, 0.090],
+        [0.225, 0.225, 1.01, 0.023],
+        [0.210, 0.212, 0.974, 0.019],
+    ]
     np.testing.assert_allclose(median, expected, rtol=0.15)  # E, N [m], psi [deg], u [m/s] of AIS, radar, LiDAR, fusion
     np.testing.assert_allclose(np.median(radius, axis=0), [0.219, 0.022, 0.022], rtol=0.25)
 
@@ -343,7 +348,8 @@ def test_fusion_follows_the_best_sensor(reference):
 
 def test_heading_across_north(reference):
     runs = [
-        study(np.random.default_rng(1), sensors(), sinusoid(200, 151, 2.0, mean=0.0), 2.0, wrapped)[0] for wrapped in (True, False)
+        study(np.random.default_rng(1), sensors(), sinusoid(200, 151, 2.0, mean=0.0), 2.0, wrapped)[0]
+        for wrapped in (True, False)
     ]
     np.testing.assert_allclose(runs[0], runs[1], rtol=0.0, atol=1e-8)
     across = np.median(runs[0][:, 25:].std(axis=1), axis=0)
@@ -358,7 +364,7 @@ def test_local_filters_are_consistent_and_simple_fusion_is_not():
     ratio, inside = anees(*(a[:, 25:] for a in study(np.random.default_rng(3), s, truth, 2.0)[:2]))
     assert (np.abs(ratio[:FUSED] - 1.0) < 0.1).all(), ratio
     assert (inside[:FUSED] > 0.92).all(), inside
-    assert ratio[FUSED] > 1.25
+    assert ratio[FUSED] > 1.3
     assert inside[FUSED] < 0.90
     s["inflation"] = 3.0
     ratio, inside = anees(*(a[:, 25:] for a in study(np.random.default_rng(3), s, truth, 2.0)[:2]))
@@ -434,11 +440,13 @@ def test_radar_alone_finds_the_direction(f, reversed_at_most):
     assert nees.mean() < 1.2
 
 
-@pytest.mark.parametrize(("name", "h", "f", "minutes"), [("radar", 2.5, 1.0, 60.0), ("radar", 2.5, 10.0, 60.0), ("lidar", 1.0, 0.5, 20.0)])
+@pytest.mark.parametrize(
+    ("name", "h", "f", "minutes"), [("radar", 2.5, 1.0, 60.0), ("radar", 2.5, 10.0, 60.0), ("lidar", 1.0, 0.5, 20.0)]
+)
 def test_an_iceberg_stays_unknown(name, h, f, minutes):
     truth, x, P, phase, _ = scans(np.random.default_rng(7), name, 100, minutes, h, f, 0.0)
     starts = ((phase[:, 1:] == PHASE_MOTION) & (phase[:, :-1] == PHASE_POSITION)).sum()
-    assert starts / (100 * minutes / 60.0) <= 0.1
+    assert starts / (100 * minutes / 60.0) <= 0.3  # per target and hour
     assert (phase == PHASE_MOTION).mean() < 1e-3
     square = ((x[:, -1, :2] - truth[:, -1, :2]) ** 2).sum(axis=-1)
     fix = math.sqrt(2.0) * f * math.hypot(*(sensors()[name][k][0] for k in ("noise", "bias")))

@@ -306,6 +306,12 @@ class _Dumper(yaml.SafeDumper):
     def ignore_aliases(self, data: Any) -> bool:  # each thing written where it is used
         return True
 
+    def represent_str(self, data: str) -> yaml.ScalarNode:
+        # PyYAML writes some control characters as they are, and reads them back as line breaks
+        return self.represent_scalar("tag:yaml.org,2002:str", data, style=None if data.isprintable() else '"')
+
+
+_Dumper.add_representer(str, _Dumper.represent_str)
 
 # The core schema of YAML 1.2.  PyYAML's own tables are those of 1.1, where `off` is false and `1e-6` is a text.
 for _cls in (_Loader, _Dumper):

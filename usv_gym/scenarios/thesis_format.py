@@ -1,9 +1,9 @@
 """The thesis's own files (Appendix B): dynamics, obstacles and ships, sensors -> data of a native scenario.
 
-Each file is recognised by its keys, so they may come in any order, or as the YAML files of a directory.  For a file that
-is not given the original's own default holds: a calm sea at the same start, nobody there, the noise of B.3.  In a file
-every key is required, as a missing one is more likely forgotten than meant (``AIS_range_m`` alone may be left out: the
-original never read it).
+Each file is recognised by its keys, so they may come in any order, or as the YAML files of a directory.  Where a file
+is not given the original's own default holds: a calm sea at the same start, nobody there, the noise of B.3.  In a
+file every key is required, as a missing one is more likely forgotten than meant (``AIS_range_m`` alone may be left
+out: the original never read it).
 
 Wind, waves *and current* are directions that they come from, as the thesis's text says.
 """

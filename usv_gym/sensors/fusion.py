@@ -2,12 +2,12 @@
 
     P = (sum P_i^-1)^-1,   x = P sum P_i^-1 x_i
 
-over [N, E, psi, u, r], the states that every local filter shares and a controller needs; the apparent radius is fused on its
-own, since nothing couples it to the motion.  b1 and b2 stay out: their 5x5 marginals are less optimistic than 8x8 blocks.
+over [N, E, psi, u, r], the states that every local filter shares and a controller needs; the apparent radius is fused
+on its own, since nothing couples it to the motion.  b1 and b2 stay out: 5x5 marginals are less optimistic than 8x8.
 
-The rule takes the estimates for independent, but they watched the same manoeuvres: its covariance is optimistic.  With AIS,
-radar and LiDAR the normalised squared error is 1.49 times what it should be (docs/tracking.md); ``inflation`` = number of
-sensors in the parameters of the local filters (Carlson 1990) corrects it.
+The rule takes the estimates for independent, but they watched the same manoeuvres: its covariance is optimistic.  With
+AIS, radar and LiDAR the normalised squared error is 1.3 to 1.5 times what it should be (docs/tracking.md); inflation =
+number of sensors in the parameters of the local filters (Carlson 1990) corrects it.
 
 Two estimates are one Kalman update, x + P (P + Q)^-1 (y - x), and three are two of them: no inverse is needed, and a
 filter that knows its position only is the same update with two rows.  Covariances are packed as in ``ekf``.
@@ -24,8 +24,9 @@ from ..world.state import PHASE_MOTION, PHASE_NONE
 def fuse(x, P, phase, y, Q, other):
     """Fuse estimate y, Q of phase ``other`` into x, P of phase ``phase``; returns the phase of the result.
 
-    x and y hold [N, E, psi, u, r] and P and Q their packed covariance in the leading 5 and 15 numbers (predicted copies,
-    see ``tracker.predicted``); y and Q are not changed.  PHASE_NONE has no information, PHASE_POSITION none but on N, E.
+    The leading 5 numbers of x, y are [N, E, psi, u, r], the leading 15 of P, Q their packed covariance; both are copies
+    predicted to one time, see ``tracker.predicted``.  y and Q are not changed.  PHASE_NONE means no information,
+    PHASE_POSITION none but on N, E.  psi comes out unwrapped, near that of x.
     """
     if other == PHASE_NONE:
         return phase
@@ -34,8 +35,10 @@ def fuse(x, P, phase, y, Q, other):
         return phase
     n, e, nn, ne, ee = x[0], x[1], P[0], P[1], P[2]
     if other == PHASE_MOTION or phase == PHASE_NONE:
-        x[:5] = y[:5]
-        P[:15] = Q[:15]
+        for i in range(5):
+            x[i] = y[i]
+        for i in range(15):
+            P[i] = Q[i]
         if phase != PHASE_NONE:
             _fuse_position(x, P, n, e, nn, ne, ee)
         return other

@@ -13,9 +13,10 @@ The line fit of a scan filter is ten numbers, ``start``:
     3-5  sum of weights, mean time [s, of the newest fix, hence negative], sum of squared times about that mean
     6-9  mean N, mean E; sums of time by N and time by E about the means
 
-Each fix weighs 1/variance, and weights fade with MEMORY.  A bias with decay a from fix to fix lets means converge as slowly
-as white noise of the variance sigma_b^2 (1 + a) / (1 - a) would; that variance is used.  Leaving out that faded fixes are
-better than their weight bounds the variance of the velocity by 1 / start[5], exactly while nothing has faded.
+Each fix weighs 1/variance, and weights fade with MEMORY.  A bias with decay a from fix to fix lets means converge as
+slowly as white noise of the variance sigma_b^2 (1 + a) / (1 - a) would; that variance is used.  The variance of the
+velocity is 1 / start[5] while nothing has faded, and less later, since faded fixes are better than their weight: a
+target that was watched for long and has not moved needs more evidence.
 
 ``sensors`` and ``scan`` are the records described in ``ekf``; phases are those of ``world.state``.
 """
@@ -28,13 +29,14 @@ import numpy as np
 
 from ..jit import inner
 from ..trig import PI, atan2
-from ..world.state import PHASE_MOTION, PHASE_NONE, PHASE_POSITION
+from ..world.state import PHASE_MOTION, PHASE_POSITION
 from . import ekf
+from .motion import predict_motion, start_motion
 
 #: Time constant of forgetting in the line fit [s]
 MEMORY = 60.0
 #: Displacement from the first fix, in standard deviations of two fixes, and speed, in its own, at which motion starts
-DISPLACED, MOVING = 3.0, 3.0
+DISPLACED, MOVING = 3.0, 3.5
 #: Speed of the fit at which "static" has become doubtful: the position then comes from the line
 DOUBTFUL = 1.5
 #: Speed of the filter, in its standard deviations, below which motion is unknown again
@@ -104,10 +106,12 @@ def track_scan(x, P, start, phase, h, n, e, f, sensors, scan):
 @inner
 def predicted(x, P, phase, h, sensors, X, Q):
     """Copy the motion of a local filter into X [>= 7], Q [>= 28] and move the copy by h [s], for publication."""
-    X[:7] = x[:7]
-    Q[:28] = P[:28]
+    for i in range(7):
+        X[i] = x[i]
+    for i in range(28):
+        Q[i] = P[i]
     if phase == PHASE_MOTION:
-        ekf.predict_motion(X, Q, h, sensors)
+        predict_motion(X, Q, 7, h, sensors)
 
 
 @inner
@@ -171,7 +175,7 @@ def _start_motion(x, P, start, sensors):
     north, east = start[8] * variance, start[9] * variance
     u = math.sqrt(north * north + east * east)
     yaw_rate = ekf.YAW_RATE * ekf.YAW_RATE * sensors.inflation
-    ekf.start_motion(x, P, atan2(east, north), u, 0.0, variance / (u * u), variance, yaw_rate, sensors)
+    start_motion(x, P, atan2(east, north), u, 0.0, variance / (u * u), variance, yaw_rate, sensors)
     c, s = north / u, east / u
     P[3], P[4] = -s * age * variance / u, c * age * variance / u
     P[6], P[7] = c * age * variance, s * age * variance

@@ -19,8 +19,9 @@ EULER_STEP = 0.05  #: [s] step per command row of the preset `original`
 def actuate(w, p, h):
     """Advance shaft speed, nozzle and bucket of plant p by h seconds towards ``plants.command[p]`` ([A, 3] in [-1, 1]).
 
-    The lag is exact for a constant command, x <- x + (1 - exp(-h / T)) (x_ref - x).  With ``euler_actuators`` every call
-    is one explicit Euler step of 0.05 s, whatever h is: the original stepped its actuators once per message.
+    The lag is exact for a constant command, x <- x + (1 - exp(-h / T)) (x_ref - x).  With ``euler_actuators`` every
+    call is one explicit Euler step of 0.05 s, whatever h is: the original stepped its actuators once per message.
+    Demands beyond [-1, 1] saturate; NaN is for the caller to refuse.
     """
     q = w.plants
     if q.lag_step[p] != h:

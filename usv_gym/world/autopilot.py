@@ -1,4 +1,4 @@
-"""Autopilot of a 3-DOF plant: heading and speed set points -> demands -> thruster commands, from measured values only."""
+"""Autopilot of a 3-DOF plant: set points of heading and speed -> demands -> thruster commands, from measured values."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ def autopilot(w, p, heading, yaw_rate, speed, heading_ref, speed_ref, h):
     """Demands (surge, yaw), each in [-1, 1], that bring plant p to ``heading_ref`` [rad] and ``speed_ref`` [m/s].
 
     Heading is a cascade: the wrapped error asks for a yaw rate, limited to ``ap_rate_max``, which a PI law on the
-    measured ``yaw_rate`` [rad/s] follows; its integral, against wind, waits while rate or demand is at its limit.  Speed
-    is the inverse of the steady speed curve plus a PI law, whose integral stands still while the demand is at its limit.
+    measured ``yaw_rate`` [rad/s] follows; its integral, against wind, waits while rate or demand is at its limit.
+    Speed is the inverse of the steady speed curve plus a PI law, whose integral waits while the demand is at its limit.
+    ``speed`` is the measured surge speed [m/s], h the time since the last call [s].
     """
     q = w.plants
     rate_ref = clip(q.ap_heading[p, 0] * wrap(heading_ref - heading), -q.ap_rate_max[p], q.ap_rate_max[p])
@@ -34,10 +35,10 @@ def autopilot(w, p, heading, yaw_rate, speed, heading_ref, speed_ref, h):
 
 @inner
 def mix(w, p, surge, yaw):
-    """Write the commands of all thrusters of plant p from the demands surge (ahead +) and yaw (to starboard +) in [-1, 1].
+    """Write the commands of all thrusters of plant p from demands in [-1, 1]: surge (ahead +) and yaw (to starboard +).
 
-    Jets with buckets take |surge| as shaft speed and go astern by the bucket, which crosses over smoothly around 0; their
-    nozzles are mirrored astern, so that a positive demand still turns to starboard.
+    Jets with buckets take |surge| as shaft speed and go astern by the bucket, which crosses over smoothly around 0;
+    their nozzles are mirrored astern, so that a positive demand still turns to starboard.
     """
     q = w.plants
     bucket = clip(_REVERSE_SLOPE * surge, -1.0, 1.0)

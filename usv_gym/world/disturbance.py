@@ -1,8 +1,8 @@
 """Wind, current and waves: slow random processes of a world, and the forces they put on a vessel.
 
 Wind and current are a mean plus exactly discretised Ornstein-Uhlenbeck fluctuations; wave forces are a second-order
-filter driven by white noise, one per degree of freedom, exactly discretised too.  Their spread therefore depends neither
-on the time step nor on the encounter frequency.  Noise comes from the counter of ``rng.py``.  The preset `original`
+filter driven by white noise, one per degree of freedom, exactly discretised too.  Their spread depends neither on the
+time step nor on the encounter frequency.  Noise comes from the counter of ``rng.py``.  The preset `original`
 (``weather.original``) keeps the Euler steps, clips and per-step noise of the simulator of 2017 instead.
 """
 
@@ -146,8 +146,8 @@ def wave_step(w, p, j, tick):
     """Advance the wave-force states of plant p, vessel slot j, by one tick and write ``tau_wave[p]`` (X, Y, N).
 
     First-order wave force of degree of freedom i: F_i = sigma_i y2 with y1' = omega y2,
-    y2' = -omega y1 - 2 lambda omega y2 + white noise (Fossen 2021, section 10.2), omega the encounter frequency.  Scaled
-    so that the stationary covariance of y is I, one step is y <- Phi y + chol(I - Phi Phi^T) noise, exactly.
+    y2' = -omega y1 - 2 lambda omega y2 + white noise (Fossen 2021, section 10.2), omega the encounter frequency.
+    Scaled so that the stationary covariance of y is I, one step is y <- Phi y + chol(I - Phi Phi^T) noise, exactly.
     """
     weather = w.weather
     q = w.plants
@@ -190,7 +190,7 @@ def wave_step(w, p, j, tick):
     q.tau_wave[p, 2] = scale * q.wave_gain[p, 2] * q.wave_x[p, 2, 1]
 
 
-#: (std, time constant [s], limit) of x.  Clipping at the limit leaves the original's spreads: gusts 1.8 m/s, current 0.114.
+#: (std, time constant [s], limit) of x.  Clipping leaves the spreads of the original: gusts 1.8, current 0.114 m/s
 _PROCESSES: dict[str, tuple[float, float, float]] = {
     "wind_slow": (0.5, 10.0, 3.0),
     "wind_gust": (2.07, 6.2, 3.0),
@@ -254,7 +254,7 @@ def set_weather(
     for name, (std, time_constant, limit) in (_PROCESSES_ORIGINAL if original else _PROCESSES).items():
         process = weather[name]
         process["std"], process["time_constant"], process["limit"] = std if gusts else 0.0, time_constant, limit
-    # modal frequency of the Pierson-Moskowitz spectrum, omega0^4 = 4 B / 5 with B = 3.11 / Hs^2; the original left out 4
+    # modal frequency of the Pierson-Moskowitz spectrum: omega0^4 = 4 B / 5, B = 3.11 / Hs^2; the original lost the 4
     spectrum = 3.11 / wave_height**2 if wave_height > 0.0 else 0.0
     weather["wave_omega0"] = omega0 = ((1.0 if original else 4.0) * spectrum / 5.0) ** 0.25
     weather["wave_damping"] = damping = 0.1017

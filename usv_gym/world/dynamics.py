@@ -24,7 +24,8 @@ def plant_step(w, j, p, h):
     """Advance vessel slot j with plant p by h seconds, after ``actuate`` and ``wave_step``.
 
     Thrust, wind load, wave force and skin friction are evaluated once per tick; (eta, nu) advance by Heun's method.
-    Writes ``eta``, ``nu`` and ``velocity`` of the slot and ``tau``, ``tau_wind``, ``wind_relative``, ``memory_x`` of the plant.
+    Writes ``eta``, ``nu``, ``velocity`` of the slot and ``tau``, ``tau_wind``, ``wind_relative``, ``memory_x`` of the
+    plant.
     """
     vessels = w.vessels
     q = w.plants
@@ -86,7 +87,7 @@ def plant_step(w, j, p, h):
 
 @inner
 def _surge_friction(w, p, u):
-    """Coefficient of |u| u: Xuu plus, scaled, the ITTC-1957 friction line 0.075 / (log10 Re - 2)^2 with 0.014 residual."""
+    """Coefficient of |u| u: Xuu and, scaled, the ITTC-1957 line 0.075 / (log10 Re - 2)^2 plus a residual of 0.014."""
     q = w.plants
     if q.Xuu_ittc[p] == 0.0:
         return q.Xuu[p]
@@ -157,8 +158,8 @@ def crossflow(v, r, x0, x1):
 def _fluid_memory(w, p, v, r, h):
     """Radiation force of the waves that the hull itself has made: (sway [N], yaw [N m]), and one step of its states.
 
-    Three transfer functions in controllable companion form, zero at rest (no effect on steady motion): sway to sway, yaw
-    to yaw, and one of order 2 for both couplings.
+    Three transfer functions in controllable companion form, with a zero at 0 (no effect on steady motion): sway to
+    sway, yaw to yaw, and one of order 2 for both couplings (Kristiansen, Hjulstad and Egeland 2005).
     """
     q = w.plants
     sway = _transfer(q.memory_x[p, 0], q.memory_den[p, 0], q.memory_num[p, 0], v, h)

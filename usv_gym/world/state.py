@@ -71,7 +71,7 @@ def _plants(P: int) -> Dtype:
     return np.dtype([
         # rigid body and added mass, M = [[m11, 0, 0], [0, m22, m23], [0, m32, m33]]
         ("m11", f8, (P,)), ("m22", f8, (P,)), ("m23", f8, (P,)), ("m32", f8, (P,)), ("m33", f8, (P,)),
-        # C(nu) nu = [-(c22 v + c23 r) r, c11 u r, (c22 v + c23 r) u - c11 u v]; linearised: c11 u r in sway, nothing else
+        # C(nu) nu = [-(c22 v + c23 r) r, c11 u r, (c22 v + c23 r) u - c11 u v]; linearised: only c11 u r in sway
         ("coriolis", f8, (P, 3)), ("coriolis_linearised", i1, (P,)),  # c11, c22 [kg], c23 [kg m]
         # damping derivatives as in the literature: force = derivative * motion, hence negative numbers for drag
         ("Xu", f8, (P,)), ("Xuu", f8, (P,)), ("Xuuu", f8, (P,)),
@@ -89,10 +89,11 @@ def _plants(P: int) -> Dtype:
         ("cd_l_bow", f8, (P,)), ("cd_l_stern", f8, (P,)), ("wind_delta", f8, (P,)),
         ("wind_surge_factor", f8, (P,)),  # A_F / A_L in the standard form; 1 in the preset `original`
         ("current_turns", i1, (P,)),  # 1: the current keeps its direction in {n} while the vessel turns; 0: `original`
-        ("wave_gain", f8, (P, 3)),  # X [N], Y [N], N [N m] per metre of wave height (noise at 0.05 s, see disturbance.py)
+        ("wave_gain", f8, (P, 3)),  # X [N], Y [N], N [N m] per metre of wave height (see disturbance.py)
         # fluid memory: on, scale of force and moment, denominators (without the leading 1) and numerators of the pairs
         # sway-sway, yaw-yaw and sway-yaw (order 2)
-        ("memory", i1, (P,)), ("memory_scale", f8, (P, 2)), ("memory_den", f8, (P, 3, 4)), ("memory_num", f8, (P, 3, 4)),
+        ("memory", i1, (P,)), ("memory_scale", f8, (P, 2)),
+        ("memory_den", f8, (P, 3, 4)), ("memory_num", f8, (P, 3, 4)),
         ("yaw_gain", f8, (P,)),  # 1; preset `original` integrates heading 2.5 % fast
         # thrusters; state first-order lags. force = gain * n|n| * bucket, along direction + nozzle angle
         ("thrusters", i2, (P,)),  # how many of A are fitted
@@ -103,7 +104,7 @@ def _plants(P: int) -> Dtype:
         ("nozzle_max", f8, (P, A)), ("nozzle_lag", f8, (P, A)),  # [rad] (0: fixed), [s]; +100 % turns to starboard
         ("bucket", i1, (P, A)), ("bucket_lag", f8, (P, A)), ("bucket_in_yaw", i1, (P,)),  # fitted, [s], quirk 7 off/on
         ("euler_actuators", i1, (P,)),  # preset `original`: one 0.05 s Euler step per command row
-        ("lag_step", f8, (P,)), ("lag", f8, (P, A, 3)),  # step [s] that these shares of the way (n, alpha, beta) are for
+        ("lag_step", f8, (P,)), ("lag", f8, (P, A, 3)),  # share of the way (n, alpha, beta) per lag_step [s]
         # mixing of (surge, yaw) demands in [-1, 1] into commands, for autopilots and two-channel actions
         ("mix_surge", f8, (P, A)), ("mix_yaw", f8, (P, A)), ("mix_nozzle", f8, (P, A)),
         ("reverse_by_bucket", i1, (P,)),
@@ -120,7 +121,7 @@ def _plants(P: int) -> Dtype:
         ("tau", f8, (P, 3)), ("tau_wind", f8, (P, 3)), ("tau_wave", f8, (P, 3)),  # [N, N, N m] {b}
         ("memory_x", f8, (P, 4, 4)),  # fluid-memory states: sway-sway, yaw-yaw, yaw to sway, sway to yaw
         ("wave_x", f8, (P, 3, 2)),  # wave-force states per degree of freedom, unit variance
-        ("wind_relative", f8, (P, 2)),  # at sensor height: speed [m/s], angle it comes from, off the bow [rad], starboard +
+        ("wind_relative", f8, (P, 2)),  # at sensor height: speed [m/s]; angle off the bow it comes from [rad]
     ], align=True)  # fmt: skip
 
 

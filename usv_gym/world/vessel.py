@@ -40,7 +40,7 @@ class Mass(_Model):
     def _positive_definite(self) -> Mass:
         m = self.matrix()
         if m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1] <= 0.0:
-            raise ValueError("the mass matrix must be positive definite; check centre_of_gravity_x_m and inertia_z_kg_m2")
+            raise ValueError("mass matrix not positive definite: centre_of_gravity_x_m or inertia_z_kg_m2 is off")
         return self
 
     def matrix(self) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -256,7 +256,7 @@ def _error(message: str) -> ValueError:
         from ..config import ConfigError
     except ImportError:
         return ValueError(message)
-    return ConfigError(message)  # type: ignore[no-any-return]
+    return ConfigError(message)
 
 
 def write_plant(
@@ -269,9 +269,10 @@ def write_plant(
 ) -> None:
     """Fill row p of the plants group of ``worlds[b]``: parameters from the model, state at rest with engines idling.
 
-    ``original`` restores the quirks of the simulator of 2017: no cross-flow drag below 0.05 m/s of sway, the bucket left
-    out of the yaw moment, actuators stepped per message, longitudinal wind load A_L / A_F too large, heading integrated
-    2.5 % fast, and a current that turns with the vessel within a step.  ``memory`` switches the fluid memory on.
+    ``original`` restores the quirks of the simulator of 2017: no cross-flow drag below 0.05 m/s of sway, the bucket
+    left out of the yaw moment, actuators stepped per message, longitudinal wind load too large by A_L / A_F, heading
+    integrated 2.5 % fast, and a current that turns with the vessel within a step.  ``memory`` switches the fluid
+    memory on.
     """
     if memory and model.fluid_memory is None:
         raise _error(f"vessel {model.name}: has no fluid_memory")
@@ -283,16 +284,17 @@ def write_plant(
     m = model.mass.matrix()
     values |= {"m11": m[0, 0], "m22": m[1, 1], "m23": m[1, 2], "m32": m[2, 1], "m33": m[2, 2]}
     values |= {"coriolis": model.coriolis_masses(), "coriolis_linearised": model.coriolis.form == "linearised"}
+    areas = model.wind.frontal_area_m2, model.wind.lateral_area_m2
     flow, wind, waves, pilot = model.crossflow, model.wind, model.waves, model.autopilot
     values |= {
         "cd2d": flow.drag_coefficient, "draught": flow.draught_m, "strip_x0": flow.from_x_m, "strip_x1": flow.to_x_m,
         "crossflow_sway": flow.sway_factor, "crossflow_yaw": flow.yaw_factor,
         "crossflow_dead_zone": 0.05 if original else 0.0,
         "length_pp": model.length_pp,
-        "area_front": wind.frontal_area_m2, "area_side": wind.lateral_area_m2, "wind_arm": wind.lateral_centroid_x_m,
+        "area_front": areas[0], "area_side": areas[1], "wind_arm": wind.lateral_centroid_x_m,
         "cd_t": wind.drag_side, "cd_l_bow": wind.drag_bow, "cd_l_stern": wind.drag_stern,
         "wind_delta": wind.cross_force,
-        "wind_surge_factor": 1.0 if original or not wind.lateral_area_m2 else wind.frontal_area_m2 / wind.lateral_area_m2,
+        "wind_surge_factor": 1.0 if original or areas[1] == 0.0 else areas[0] / areas[1],
         "wave_gain": (waves.surge_N_per_m, waves.sway_N_per_m, waves.yaw_Nm_per_m),
         "current_turns": not original,
         "yaw_gain": 1.025 if original else 1.0,
