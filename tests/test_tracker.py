@@ -518,3 +518,20 @@ def test_copies_leave_the_filter_alone():
     np.testing.assert_array_equal(Q, P[:28])
     tracker.predicted(x, P, PHASE_POSITION, 3.0, s, X, Q)
     np.testing.assert_array_equal(Q, P[:28])
+
+
+def test_sensors_without_noise():
+    s = sensors()
+    for name in ("radar", "lidar"):
+        s[name]["noise"] = s[name]["bias"] = s[name]["bias_time"] = 0.0
+    s["ais_noise"] = s["ais_bias"] = s["ais_bias_time"] = 0.0
+    x, P, start = np.zeros(NX_SCAN), np.zeros(NP_SCAN), np.zeros(10)
+    y, Q = np.zeros(NX_AIS), np.zeros(NP_AIS)
+    scan = ais = PHASE_NONE
+    for k in (0, 0, *range(1, 30)):  # the second fix comes at the time of the first
+        h = 2.5 if k else 0.0
+        scan = tracker.track_scan(x, P, start, scan, h, 3.0 * k, 4.0 * k, 1.0, s[()], s[()]["radar"])
+        ais = tracker.track_ais(y, Q, ais, h, 3.0 * k, 4.0 * k, math.atan2(4.0, 3.0), 2.0, 0.0, s[()])
+    assert scan == ais == PHASE_MOTION
+    for estimate in (x, y):
+        np.testing.assert_allclose(estimate[:5], [87.0, 116.0, math.atan2(4.0, 3.0), 2.0, 0.0], atol=1e-3)

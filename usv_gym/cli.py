@@ -150,7 +150,7 @@ def schema(
             file.write(text.encode() + b"\n")
 
 
-def _complain(error: Exception) -> None:
+def _complain(error: BaseException) -> None:
     for line in str(error).splitlines():
         typer.echo(f"usv-gym: {line}", err=True)
 
@@ -164,7 +164,7 @@ def main() -> None:
     from .config import ConfigError
     from .replay.archive import ArchiveError
 
-    warnings.showwarning = _short_warning  # type: ignore[assignment]
+    warnings.showwarning = _short_warning
     try:
         app()
     except (ConfigError, ArchiveError) as error:

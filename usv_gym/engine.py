@@ -6,7 +6,7 @@ the next frame's decisions; then the sensors that are due.  What a sensor sees i
 
 from __future__ import annotations
 
-from .jit import inner, kernel
+from .jit import kernel, spliced
 from .sensors.nav import navigate
 from .sensors.schedule import first_events, sense
 from .traffic.ships import follow_route, move_traffic, steer
@@ -17,7 +17,7 @@ from .world.safety import begin_frame, sweep
 from .world.state import MODEL_3DOF
 
 
-@inner
+@spliced
 def tick_world(w, rows, row):
     """Advance one world by one tick.
 
@@ -53,7 +53,7 @@ def tick_world(w, rows, row):
         sense(w, tick)
 
 
-@inner
+@spliced
 def end_frame(w):
     """Close the traffic frame that ends now and decide the next one."""
     move_traffic(w, w.tick)
@@ -66,7 +66,7 @@ def end_frame(w):
     steer(w, w.frame_ticks * w.dt)
 
 
-@inner
+@spliced
 def reset_world(w):
     """Bring a freshly written world to tick 0: weather state, first decisions, first navigation, sensor schedule."""
     w.tick = 0
@@ -77,7 +77,7 @@ def reset_world(w):
     sweep(w)
     for o in range(w.observer.shape[0]):
         w.safety.step_closest[o] = 1.0e9
-    navigate(w, 0)
+    navigate(w, w.tick)
     first_events(w)
 
 

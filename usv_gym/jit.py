@@ -1,8 +1,9 @@
 """How kernels are compiled: one place for the numba flags and for the on-disk cache.
 
-Two decorators:
+Three decorators:
 
 ``inner``   a helper that other kernels call; never cached by itself.
+``spliced`` the same, large and called in one place only.
 ``kernel``  an entry point that Python calls; compiled once per machine and kept on disk.
 
 numba stamps a cached kernel with its own file only, so an edited helper in another module would keep serving the stale
@@ -30,6 +31,15 @@ _FLAGS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nog
 def inner(function: F) -> F:
     """Compile a helper that is called from kernels."""
     return numba.njit(**_FLAGS)(function)  # type: ignore[no-any-return]
+
+
+def spliced(function: F) -> F:
+    """Compile a helper as part of its caller: for large functions that are called in one place.
+
+    LLVM optimises the code of every callee again with each caller above it; a deep chain of large functions would be
+    optimised once per level.  Splicing takes a level out, which is most of the compile time.
+    """
+    return numba.njit(inline="always", **_FLAGS)(function)  # type: ignore[no-any-return]
 
 
 def kernel(function: F) -> F:

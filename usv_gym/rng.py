@@ -14,11 +14,11 @@ import math
 import numpy as np
 
 from .jit import inner
-from .trig import sincos
+from .trig import sincos_random
 
 # Streams: one per use, never reused.  Each world draws stream x slot x tick.
 WIND, CURRENT, WAVE = 1, 2, 3
-GNSS, IMU, SPEED_LOG, WIND_SENSOR, MRU, HEADING = 10, 11, 12, 13, 14, 15
+GNSS, IMU, SPEED_LOG, WIND_SENSOR, MRU, GNSS_SPEED = 10, 11, 12, 13, 14, 15
 AIS_BIAS, AIS_NOISE, AIS_LOSS, AIS_PHASE, AIS_LATENCY = 20, 21, 22, 23, 24
 RADAR_BIAS, RADAR_NOISE, RADAR_DETECTION = 30, 31, 32
 LIDAR_BIAS, LIDAR_NOISE, LIDAR_DETECTION = 40, 41, 42
@@ -50,7 +50,7 @@ def bits(seed, stream, slot, tick):
 @inner
 def uniform(seed, stream, slot, tick):
     """One number in [0, 1)."""
-    return np.float64(bits(seed, stream, slot, tick) >> _S11) * _TO_UNIT
+    return np.float64(np.int64(bits(seed, stream, slot, tick) >> _S11)) * _TO_UNIT
 
 
 @inner
@@ -58,8 +58,8 @@ def normal2(seed, stream, slot, tick):
     """Two independent standard normal numbers (Box and Muller 1958)."""
     first = bits(seed, stream, slot, tick)
     second = _mix(first + _GOLDEN)
-    u = (np.float64(first >> _S11) + 0.5) * _TO_UNIT
-    v = np.float64(second >> _S11) * _TO_UNIT
+    u = (np.float64(np.int64(first >> _S11)) + 0.5) * _TO_UNIT
+    v = np.float64(np.int64(second >> _S11)) * _TO_UNIT
     radius = math.sqrt(-2.0 * math.log(u))
-    s, c = sincos(2.0 * math.pi * v)
+    s, c = sincos_random(2.0 * math.pi * v)
     return radius * c, radius * s

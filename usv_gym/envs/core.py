@@ -114,6 +114,7 @@ class Core:
         self.truncated = np.zeros(num, np.bool_)
         self.actions = np.zeros((num, 1 if self.action_name == "discrete" else self.action_space.shape[0]))  # type: ignore[index]
         self.episodes = np.zeros(num, episode_dtype())
+        self._what = np.zeros(num, np.int8)
 
     # --- set-up ------------------------------------------------------------------------------------------------------
     def _load(self, source: Source | None, vessel: str | None) -> None:
@@ -166,16 +167,15 @@ class Core:
     def reset(self, mask: NDArray[np.bool_], generators: Sequence[np.random.Generator]) -> None:
         """Draw and start new episodes in the rows of ``mask`` [B]; generators [B] own the randomness."""
         from ..scenarios.families import sample_open_sea
-        from ..tasks.step import reset_batch
-
-        for b in np.flatnonzero(mask):
+        for b in np.flatnonzero(mask).tolist():
             self._bytes[b] = self._template
             self.worlds["seed"][b] = generators[b].integers(0, 1 << 63, dtype=np.uint64)
             self._set_weather(b, generators[b])
         if self.source is None:
             difficulty = np.full(self.num, self.difficulty)
             sample_open_sea(self.worlds, mask, difficulty, self.model.cruise_speed)
-        reset_batch(self.worlds, self.task, self.episodes, mask, self.obs)
+        self._what[:] = mask  # BEGIN is 1
+        self._run(NO_ROWS)
 
     def _set_weather(self, b: int, generator: np.random.Generator) -> None:
         """Overwrite the weather of row b where the caller or the family asks for it."""
@@ -208,12 +208,18 @@ class Core:
         ValueError
             if an action is not finite; nothing has moved then.
         """
-        from ..tasks.step import step_batch
-
-        bad = step_batch(self.worlds, self.task, self.episodes, mask, self.actions, rows, self.obs, self.terms,
-                         self.reward, self.terminated, self.truncated)  # fmt: skip
+        self._what[:] = mask
+        self._what *= 2  # STEP
+        bad = self._run(rows)
         if bad >= 0:
             raise ValueError(f"action {self.actions[bad].tolist()} is not finite" + (f" (row {bad})" if self.num > 1 else ""))
+
+    def _run(self, rows: NDArray[np.float64]) -> int:
+        from ..tasks.step import run_batch
+
+        bad: int = run_batch(self.worlds, self.task, self.episodes, self._what, self.actions, rows, self.obs, self.terms,
+                             self.reward, self.terminated, self.truncated)  # fmt: skip
+        return bad
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -84,7 +84,7 @@ class USVEnv(gym.Env[Any, Any]):
     v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012
 
     def __init__(
         self,
@@ -125,7 +125,6 @@ class USVEnv(gym.Env[Any, Any]):
         self.core.configure(options)
         with compiling():
             self.core.reset(_ONE, [self.np_random])
-        self.core.terms[0] = 0.0
         self._commands = self._history = None
         self._started = True
         return self._observation(), {**self.core.info(0), "scales": self.core.scales()}
@@ -151,7 +150,7 @@ class USVEnv(gym.Env[Any, Any]):
         return (self._observation(), float(core.reward[0]), bool(core.terminated[0]), bool(core.truncated[0]),
                 core.info(0))  # fmt: skip
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """The map as [H, W, 3] for ``rgb_array``; None without a render mode."""
         if self.render_mode is None:
             warnings.warn("render() needs a render_mode; pass render_mode='rgb_array' to gym.make", stacklevel=2)

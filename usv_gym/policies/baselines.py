@@ -57,20 +57,32 @@ class Waypoints(Piloted):
 class Avoid(Waypoints):
     """The waypoint follower, made to go around what the TDM reports: one honest reactive baseline.
 
-    Every step it tries headings up to 100 deg to either side of the line-of-sight course, at cruising and at reduced speed,
-    predicts straight lines for all targets (closest point of approach), and takes the cheapest: deviation, with port dearer
-    than starboard, plus a steep price for passing any target closer than its radius, its uncertainty and a margin.
+    Every step it tries headings to either side of the line-of-sight course, each at full, half and no cruising speed.  It
+    predicts its own path (a turn at ``TURN_RATE``, then straight) and straight lines for all targets, and takes the cheapest:
+    deviation, with port dearer than starboard, plus a steep price for coming closer to a target, soonest first, than a margin
+    beyond its radius and its uncertainty.
     """
 
-    HORIZON = 90.0  # [s] approaches further in the future do not count yet
-    OFFSETS = np.radians(np.arange(-100.0, 101.0, 10.0))
-    SPEEDS = np.array([1.0, 0.5])  # shares of the cruising speed
+    TURN_RATE = 0.1  # [rad/s] assumed of its own turns
+    SPEED_TIME = 8.0  # [s] assumed time constant of its own speed
+    TIMES = np.arange(3.0, 61.0, 3.0)  # [s] of the prediction
+    OFFSETS = np.radians(np.arange(-120.0, 121.0, 15.0))
+    SHARES = np.array([1.0, 0.5, 0.0])  # of the cruising speed
 
     def reset(self, info: dict[str, Any]) -> None:
         """Forget the last course."""
         super().reset(info)
-        self.margin = 25.0 + 2.0 * self.scales["length"]
+        self.margin = 20.0 + 2.0 * self.scales["length"]
         self.last = 0.0
+        self.offset, self.share = (grid.ravel() for grid in np.meshgrid(self.OFFSETS, self.SHARES, indexing="ij"))
+
+    def paths(self, turn: NDArray[np.float64], picture: Picture) -> NDArray[np.float64]:
+        """Own positions [c, T, 2] {b} at ``TIMES``, for every turn [c] [rad] with the speed of ``self.share`` [c]."""
+        heading = np.clip(turn[:, None], -self.TURN_RATE * self.TIMES, self.TURN_RATE * self.TIMES)
+        change = self.cruise * self.share[:, None] - picture.speed
+        speed = picture.speed + change * -np.expm1(-self.TIMES / self.SPEED_TIME)
+        step = self.TIMES[1] - self.TIMES[0]
+        return np.cumsum(step * speed[..., None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1), axis=1)
 
     def act(self, observation: dict[str, NDArray[Any]]) -> NDArray[np.float32]:
         """Take the cheapest of the courses and speeds that were tried."""
@@ -79,23 +91,21 @@ class Avoid(Waypoints):
         if not len(picture.position):
             self.last = 0.0
             return self.command(wanted, self.cruise)
-        offset, share = (grid.ravel() for grid in np.meshgrid(self.OFFSETS, self.SPEEDS, indexing="ij"))
-        heading = wanted + offset
-        velocity = self.cruise * share[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)  # [c, 2] {b}
-        relative = picture.target_velocity[None] - velocity[:, None]  # [c, n, 2]
-        position = picture.position[None]
-        closing = np.einsum("cnk,cnk->cn", np.broadcast_to(position, relative.shape), relative)
-        tcpa = np.clip(-closing / np.maximum((relative**2).sum(-1), 1e-9), 0.0, self.HORIZON)
-        passing = np.linalg.norm(position + relative * tcpa[..., None], axis=-1) - picture.radius - picture.spread
-        lack = np.clip(1.0 - passing / self.margin, 0.0, 2.0)
-        urgency = 1.0 / (1.0 + tcpa / 20.0)
+        turn = (wanted + self.offset + math.pi) % (2.0 * math.pi) - math.pi
+        own = self.paths(turn, picture)
+        target = picture.position[:, None] + picture.target_velocity[:, None] * self.TIMES[:, None]  # [n, T, 2]
+        apart = own[:, None] - target[None]  # [c, n, T, 2]
+        size = (picture.radius + picture.spread + 0.5 * self.scales["length"])[:, None]
+        gap = np.sqrt(np.einsum("cntk,cntk->cnt", apart, apart)) - size
+        lack = np.clip(1.0 - gap / self.margin, 0.0, 2.0)
+        danger = (lack**2 * np.exp(-self.TIMES / 30.0)).max(axis=(1, 2))
         price = (
-            (lack**2 * (0.4 + urgency)).max(axis=1) * 30.0
-            + np.abs(offset)
-            + 0.2 * (offset < 0.0)
-            + 1.2 * (1.0 - share)
-            + 0.3 * np.abs(offset - self.last)
+            30.0 * danger
+            + np.abs(self.offset)
+            + 0.2 * (self.offset < 0.0)
+            + 1.5 * (1.0 - self.share)
+            + 0.3 * np.abs(self.offset - self.last)
         )
         best = int(np.argmin(price))
-        self.last = float(offset[best])
-        return self.command(float(heading[best]), float(self.cruise * share[best]))
+        self.last = float(self.offset[best])
+        return self.command(float(turn[best]), float(self.cruise * self.share[best]))

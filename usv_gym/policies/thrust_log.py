@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,10 +64,11 @@ def commands(log: NDArray[np.float64], model: VesselModel) -> NDArray[np.float64
     starboard = [a for a, t in enumerate(model.thrusters) if t.y_m > 0]
     if len(port) != 1 or len(starboard) != 1:
         raise ConfigError(f"vessel {model.name}: a thrust log needs one thruster on either side")
-    result: NDArray[Any] = np.zeros((len(log), A, 3))
+    result = np.zeros((len(log), A, 3))
     result[:, port[0]] = log[:, 0:3] / 100.0
     result[:, starboard[0]] = log[:, 3:6] / 100.0
-    return np.clip(result, -1.0, 1.0)
+    limited: NDArray[np.float64] = np.clip(result, -1.0, 1.0)
+    return limited
 
 
 def per_tick(rows: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
@@ -79,8 +79,10 @@ def per_tick(rows: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
     k = RATE * dt
     if k < 1.0:
         ticks = math.ceil(len(rows) / k)
-        return rows[np.minimum((np.arange(ticks) * k).astype(int), len(rows) - 1)][:, None]
+        held: NDArray[np.float64] = rows[np.minimum((np.arange(ticks) * k).astype(int), len(rows) - 1)]
+        return held[:, None]
     per = max(round(k), 1)
     ticks = -(-len(rows) // per)
     index = np.minimum(np.arange(ticks * per), len(rows) - 1)
-    return rows[index].reshape(ticks, per, *rows.shape[1:])
+    grouped: NDArray[np.float64] = rows[index].reshape(ticks, per, *rows.shape[1:])
+    return grouped

@@ -326,6 +326,7 @@ def _meta(w: Any) -> dict[str, Any]:
         },
         "origin": w["origin"], "metres_per_degree": w["metres_per_degree"], "epoch_us": w["epoch_us"],
         "dt_us": w["dt_us"], "own": w["observer"][0], "area": w["area"],
+        "thruster_y": w["plants"]["y"][max(int(vessels["plant"][w["observer"][0]]), 0)],
         "models": vessels["model"],
         "kinds": np.concatenate([vessels["kind"], obstacles["kind"]]),
         "mmsi": np.concatenate([vessels["mmsi"], obstacles["mmsi"]]),

@@ -1,0 +1,1 @@
+"""Where worlds come from: files, families, and commands to a running world."""

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .. import rng
-from ..jit import inner, kernel
+from ..jit import inner, kernel, spliced
 from ..trig import PI, atan2, sincos
 from ..units import DEG
 from ..world.state import (
@@ -34,7 +36,7 @@ FIRST_MMSI = 257_000_001
 @inner
 def _between(w, slot, draw, low, high):
     """A uniform number in [low, high) that belongs to (object slot, draw)."""
-    return low + (high - low) * rng.uniform(w.seed, rng.FAMILY, slot, draw)
+    return low + (high - low) * rng.uniform(w.seed, rng.FAMILY, np.int64(slot), np.int64(draw))
 
 
 @inner
@@ -82,7 +84,7 @@ def put_ship(w, j, kind, length, beam, speed, n0, e0, n1, e1):
     r.after_last[j] = AFTER_CONTINUE
 
 
-@inner
+@spliced
 def draw_open_sea(w, difficulty, cruise):
     """Draw route, icebergs and ships of an open sea into a template whose own ship is in place, from ``w.seed``."""
     v, r, m = w.vessels, w.routes, w.obstacles

@@ -32,6 +32,8 @@ from .motion import column, correct, correct_row, predict_motion, start_motion
 
 #: Standard deviation of a yaw rate of which nothing is known: 1 deg/s [rad/s]
 YAW_RATE = math.radians(1.0)
+#: Smallest variance of a white error [m2, rad2, ..]: a sensor without noise must not divide by zero
+VARIANCE_MIN = 1e-8
 
 _N, _E, _BN_N, _BN, _BE_E, _BE = 0, 2, 28, 35, 37, 44  # packed entries that the static filter uses
 
@@ -43,8 +45,8 @@ def predict_scan(x, P, h, sensors, scan):
     if h > 0.0:
         predict_motion(x, P, 9, h, sensors)
         a = math.exp(-h / scan.bias_time[0])
-        _predict_bias(x, P, 9, 7, a, scan.bias[0])
-        _predict_bias(x, P, 9, 8, a, scan.bias[0])
+        for i in range(7, 9):
+            _predict_bias(x, P, 9, i, a, scan.bias[0])
 
 
 @inner
@@ -100,13 +102,21 @@ def _field(i):
     return i if i < 3 else i + 1
 
 
+@inner
+def white(f, noise):
+    """Variance of the white part of an error with factor f and standard deviation ``noise`` at f = 1."""
+    return max(f * f * noise * noise, VARIANCE_MIN)
+
+
 # --- update ----------------------------------------------------------------------------------------------------------
 @inner
 def update_scan(x, P, n, e, f, scan):
     """Fix n, e [m] of radar or LiDAR with error factor f = f(d)."""
-    variance = f * f * scan.noise[0] * scan.noise[0]
-    _update_scan(x, P, 0, n, f, variance)
-    _update_scan(x, P, 1, e, f, variance)
+    variance = white(f, scan.noise[0])
+    z = (n, e)
+    for i in range(2):  # numba would compile a call with a literal index once per index
+        if not np.isnan(z[i]):
+            _update_scan(x, P, i, z[i], f, variance)
 
 
 @inner
@@ -124,7 +134,7 @@ def update_position(x, P, n, e, f, noise):
     """Fix n, e [m] into a static filter; noise is the white standard deviation [m] at f = 1."""
     g0 = P[_N] + f * P[_BN_N]
     g7 = P[_BN_N] + f * P[_BN]
-    s = 1.0 / (g0 + f * g7 + f * f * noise * noise)
+    s = 1.0 / (g0 + f * g7 + white(f, noise))
     dn = s * (n - x[0] - f * x[7])
     de = s * (e - x[1] - f * x[8])
     x[0] += g0 * dn
@@ -141,7 +151,7 @@ def update_size(x, P, radius, f, scan):
     """Measured apparent radius [m] with error factor f."""
     g0 = P[0] + f * P[1]
     g1 = P[1] + f * P[2]
-    s = 1.0 / (g0 + f * g1 + f * f * scan.noise[1] * scan.noise[1])
+    s = 1.0 / (g0 + f * g1 + white(f, scan.noise[1]))
     d = s * (radius - x[0] - f * x[1])
     x[0] += g0 * d
     x[1] += g1 * d
@@ -153,8 +163,6 @@ def update_size(x, P, radius, f, scan):
 @inner
 def _update_scan(x, P, i, z, f, variance):
     """Scalar update with z = x_i + f x_{7+i} + white noise."""
-    if np.isnan(z):
-        return
     k = 28 if i == 0 else 36
     g0, g1, g2, g3, g4, g5, g6 = column(P, i, k, f)
     g7 = P[28 + i] + f * P[35 if i == 0 else 43]
@@ -162,9 +170,9 @@ def _update_scan(x, P, i, z, f, variance):
     s = 1.0 / ((g0 if i == 0 else g1) + f * (g7 if i == 0 else g8) + variance)
     d = s * (z - x[i] - f * x[7 + i])
     correct(x, P, s, d, g0, g1, g2, g3, g4, g5, g6)
-    correct_row(P, 28, s * g7, g0, g1, g2, g3, g4, g5, g6)
+    for row, g in ((28, g7), (36, g8)):
+        correct_row(P, row, s * g, g0, g1, g2, g3, g4, g5, g6)
     P[35] -= s * g7 * g7
-    correct_row(P, 36, s * g8, g0, g1, g2, g3, g4, g5, g6)
     P[43] -= s * g8 * g7
     P[44] -= s * g8 * g8
     x[7] += g7 * d
@@ -182,14 +190,11 @@ def _update_ais(x, P, i, innovation, noise):
     g10 = P[55 + i] + P[k + 10 if i >= 3 else 62 + i]
     g11 = P[66 + i] + P[73 + i]
     own = P[i * (i + 1) // 2 + i] + 2.0 * P[k + i] + P[k + 7 + i]
-    s = 1.0 / (own + noise * noise)
+    s = 1.0 / (own + white(1.0, noise))
     d = s * innovation
     correct(x, P, s, d, g0, g1, g2, g3, g4, g5, g6)
-    correct_row(P, 28, s * g7, g0, g1, g2, g3, g4, g5, g6)
-    correct_row(P, 36, s * g8, g0, g1, g2, g3, g4, g5, g6)
-    correct_row(P, 45, s * g9, g0, g1, g2, g3, g4, g5, g6)
-    correct_row(P, 55, s * g10, g0, g1, g2, g3, g4, g5, g6)
-    correct_row(P, 66, s * g11, g0, g1, g2, g3, g4, g5, g6)
+    for row, g in ((28, g7), (36, g8), (45, g9), (55, g10), (66, g11)):
+        correct_row(P, row, s * g, g0, g1, g2, g3, g4, g5, g6)
     P[35] -= s * g7 * g7
     P[43], P[44] = P[43] - s * g8 * g7, P[44] - s * g8 * g8
     P[52], P[53], P[54] = P[52] - s * g9 * g7, P[53] - s * g9 * g8, P[54] - s * g9 * g9
@@ -208,8 +213,10 @@ def _update_ais(x, P, i, innovation, noise):
 @inner
 def init_position(x, P, n, e, variance, cross, bias):
     """Static filter at n, e [m]; per axis the variance [m2], its covariance with the bias, the bias's deviation [m]."""
-    x[:] = 0.0
-    P[:] = 0.0
+    for i in range(len(x)):
+        x[i] = 0.0
+    for i in range(len(P)):
+        P[i] = 0.0
     x[0] = n
     x[1] = e
     P[_N] = P[_E] = variance
@@ -220,7 +227,7 @@ def init_position(x, P, n, e, variance, cross, bias):
 @inner
 def init_fix(x, P, n, e, f, noise, bias):
     """Static filter from one fix: position is known as well as the fix is, and wrong by just what the bias is."""
-    init_position(x, P, n, e, f * f * (noise * noise + bias * bias), -f * bias * bias, bias)
+    init_position(x, P, n, e, white(f, noise) + f * f * bias * bias, -f * bias * bias, bias)
 
 
 @inner
@@ -241,7 +248,7 @@ def init_ais(x, P, n, e, psi, u, r, sensors):
         k = (7 + i) * (8 + i) // 2
         P[k + 7 + i] = bias * bias
         if i < 4 or not np.isnan(r):
-            P[i * (i + 1) // 2 + i] = noise * noise + bias * bias
+            P[i * (i + 1) // 2 + i] = white(1.0, noise) + bias * bias
             P[k + i] = -bias * bias
 
 
@@ -251,6 +258,6 @@ def init_size(x, P, radius, f, scan):
     bias = scan.bias[1] * scan.bias[1]
     x[0] = radius
     x[1] = 0.0
-    P[0] = f * f * (scan.noise[1] * scan.noise[1] + bias)
+    P[0] = white(f, scan.noise[1]) + f * f * bias
     P[1] = -f * bias
     P[2] = bias

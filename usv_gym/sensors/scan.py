@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 
 from .. import rng
-from ..jit import inner
+from ..jit import inner, spliced
 from ..world.state import LIDAR, RADAR
 from .shadow import apparent_half_width, cast_shadows, look_around
 from .tdm import take_scan
 
 
-@inner
+@spliced
 def deliver(w, o, k, tick):
     """Hand the last scan of radar (k = 0) or LiDAR (k = 1) to the tracker, once its latency is over."""
     t = w.tracks

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ..jit import inner
+from ..jit import inner, spliced
 from .ais import NEVER, next_fire, schedule, transmit
 from .scan import deliver, scan_lidar, scan_radar
 from .tdm import publish, take_ais
 
 
-@inner
+@spliced
 def first_events(w):
     """Schedule the first transmissions and set ``w.next_sense``."""
     S = w.ais.next_tick.shape[0]
@@ -16,8 +16,8 @@ def first_events(w):
         w.ais.last_tick[s] = -1
         w.ais.next_tick[s] = NEVER
         if w.sensors.exteroceptive:
-            schedule(w, s, 0)
-    _set_next(w, 0)
+            schedule(w, s, w.tick)
+    _set_next(w, w.tick)
 
 
 @inner
@@ -47,7 +47,7 @@ def _due(tick, dt_us, period_us):
     return period_us > 0 and (tick * dt_us) // period_us > ((tick - 1) * dt_us) // period_us
 
 
-@inner
+@spliced
 def sense(w, tick):
     """Fire everything that is due at ``tick``: transmissions, receptions, scans, then the TDM's report."""
     p = w.sensors
@@ -69,8 +69,8 @@ def sense(w, tick):
             scan_radar(w, o, tick)
         if lidar:
             scan_lidar(w, o, tick)
-        deliver(w, o, 0, tick)
-        deliver(w, o, 1, tick)
+        for k in range(2):
+            deliver(w, o, k, tick)
         if report:
             publish(w, o, tick)
     _set_next(w, tick)

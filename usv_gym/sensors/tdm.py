@@ -30,6 +30,7 @@ from .ekf import init_scan_motion, init_size, predict_size, update_size
 from .fusion import fuse, fuse_size
 from .tracker import MOVING, predicted, track_ais, track_scan
 
+
 @inner
 def _timeout_us(w, o, s, sensor):
     if sensor == RADAR:

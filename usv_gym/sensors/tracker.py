@@ -70,7 +70,7 @@ def track_ais(x, P, phase, h, n, e, psi, u, r, sensors):
 def track_scan(x, P, start, phase, h, n, e, f, sensors, scan):
     """Take one fix n, e [m] of radar or LiDAR with error factor f = f(d) into a local filter.  Returns the new phase.
 
-    h [s] is the time since the filter's time of validity, and positive unless phase is PHASE_NONE.
+    h [s] is the time since the filter's time of validity, of no account in PHASE_NONE.
     """
     if phase == PHASE_MOTION:
         ekf.predict_scan(x, P, h, sensors, scan)
@@ -85,7 +85,7 @@ def track_scan(x, P, start, phase, h, n, e, f, sensors, scan):
         ekf.update_position(x, P, n, e, f, scan.noise[0])
         extend_line(start, h, n, e, f, scan)
         speed2 = (start[8] * start[8] + start[9] * start[9]) / start[5]  # in variances of the velocity
-        if speed2 > DOUBTFUL * DOUBTFUL:
+        if speed2 > DOUBTFUL * DOUBTFUL:  # False while the line is one point (NaN)
             # The newest point of the line, whose error already contains the bias
             age = -start[4]
             north = start[6] + age * start[8] / start[5]
@@ -133,7 +133,8 @@ def fold(x, P):
 @inner
 def start_line(start, n, e, f, scan):
     """Begin the line fit with a first fix."""
-    start[:] = 0.0
+    for i in range(10):
+        start[i] = 0.0
     start[0] = start[6] = n
     start[1] = start[7] = e
     start[2] = _fix_variance(f, scan)
@@ -143,10 +144,12 @@ def start_line(start, n, e, f, scan):
 @inner
 def extend_line(start, h, n, e, f, scan):
     """Add a fix h [s] after the last one (weighted running moments, West 1979, with forgetting)."""
+    if h <= 0.0:
+        return
     fade = math.exp(-h / MEMORY)
     a = math.exp(-h / scan.bias_time[0])
-    noise, bias = f * scan.noise[0], f * scan.bias[0]
-    w = 1.0 / (noise * noise + bias * bias * (1.0 + a) / (1.0 - a))
+    bias = f * scan.bias[0]
+    w = 1.0 / (ekf.white(f, scan.noise[0]) + bias * bias * (1.0 + a) / (1.0 - a))
     old = fade * start[3]
     age = h - start[4]
     share = w / (old + w)
@@ -162,7 +165,7 @@ def extend_line(start, h, n, e, f, scan):
 
 @inner
 def _fix_variance(f, scan):
-    return f * f * (scan.noise[0] * scan.noise[0] + scan.bias[0] * scan.bias[0])
+    return ekf.white(f, scan.noise[0]) + f * f * scan.bias[0] * scan.bias[0]
 
 
 @inner

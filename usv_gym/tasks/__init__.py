@@ -1,0 +1,1 @@
+"""The decision problem: actions, observations, rewards, ends of an episode."""

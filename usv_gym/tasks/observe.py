@@ -189,8 +189,8 @@ def _shade_sectors(task, obs, bearing, distance, radius):
     width = TWO_PI / n
     half = PI if distance <= radius else math.asin(radius / distance)
     closeness = clip(1.0 - max(distance - radius, 0.0) / task.range_scale, 0.0, 1.0)
-    first = int(math.floor((bearing - half) / width))
-    last = int(math.floor((bearing + half) / width))
+    first = math.floor((bearing - half) / width)
+    last = math.floor((bearing + half) / width)
     for i in range(first, min(last, first + n - 1) + 1):
         at = N_OWN + (i + 10 * n) % n
         obs[at] = max(obs[at], closeness)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..engine import reset_world, tick_world
-from ..jit import inner, kernel
+from ..jit import inner, kernel, spliced
 from ..traffic.ships import move_traffic
 from ..trig import PI, clip, wrap
 from ..world.autopilot import autopilot, mix
@@ -29,9 +29,9 @@ def distance_to_go(w, j):
     return total
 
 
-@inner
-def begin_episode(w, task, episode, obs):
-    """Reset world and episode memory; write the first observation."""
+@spliced
+def begin_episode(w, task, episode):
+    """Reset world and episode memory."""
     reset_world(w)
     own = w.observer[0]
     episode.step = 0
@@ -42,7 +42,6 @@ def begin_episode(w, task, episode, obs):
         episode.last_action[c] = 0.0
     episode.closest = 1.0e9
     episode.outcome = 0
-    observe(w, 0, task, obs)
 
 
 @inner
@@ -75,9 +74,9 @@ def _decode(w, task, episode, action):
     return change / task.channels
 
 
-@inner
-def step_task(w, task, episode, action, rows, obs, terms):
-    """One control step of a world.  Returns (reward, terminated, truncated) and fills obs and terms."""
+@spliced
+def step_task(w, task, episode, action, rows, terms):
+    """One control step of a world.  Returns (reward, terminated, truncated) and fills terms."""
     own = w.observer[0]
     p = w.vessels.plant[own]
     change = _decode(w, task, episode, action)
@@ -126,37 +125,40 @@ def step_task(w, task, episode, action, rows, obs, terms):
     truncated = not terminated and task.max_steps > 0 and episode.step >= task.max_steps
     if terminated or truncated:
         episode.outcome = 1 if collision else (2 if arrival else (3 if outside else 4))
-    observe(w, 0, task, obs)
     return reward, terminated, truncated
 
 
+BEGIN, STEP = 1, 2  #: what ``run_batch`` does with a row
+
+
 @kernel
-def step_batch(worlds, task, episodes, mask, actions, rows, obs, terms, reward, terminated, truncated):
-    """Control step of every row where ``mask`` [B] is true.
+def run_batch(worlds, task, episodes, what, actions, rows, obs, terms, reward, terminated, truncated):
+    """Begin an episode in the rows where ``what`` [B] is BEGIN, make a control step where it is STEP, leave the others.
 
     worlds [B], task [1], episodes [B], actions [B, n] float64, rows [ticks, n, A, 3] (see engine.advance_worlds),
     obs [B, size] float32, terms [B, N_TERMS], reward [B], terminated [B], truncated [B]; the last five are written.
-    Returns -1, or the first row whose action is not finite; then nothing at all has moved.
+    Returns -1, or the first row whose action is not finite; then nothing at all has moved.  (One entry point for both,
+    because what they share is then compiled once.)
     """
     for b in range(worlds.shape[0]):
-        if mask[b]:
+        if what[b] == STEP:
             for c in range(actions.shape[1]):
                 if not math.isfinite(actions[b, c]):
                     return b
     for b in range(worlds.shape[0]):
-        if mask[b]:
+        if what[b] == BEGIN:
+            begin_episode(worlds[b], task[0], episodes[b])
+            reward[b] = 0.0
+            terminated[b] = truncated[b] = False
+            for i in range(terms.shape[1]):
+                terms[b, i] = 0.0
+        elif what[b] == STEP:
             reward[b], terminated[b], truncated[b] = step_task(
-                worlds[b], task[0], episodes[b], actions[b], rows, obs[b], terms[b]
+                worlds[b], task[0], episodes[b], actions[b], rows, terms[b]
             )
+        if what[b] != 0:
+            observe(worlds[b], 0, task[0], obs[b])
     return -1
-
-
-@kernel
-def reset_batch(worlds, task, episodes, mask, obs):
-    """Bring freshly written rows to tick 0 where ``mask`` [B] is true and write their first observation."""
-    for b in range(worlds.shape[0]):
-        if mask[b]:
-            begin_episode(worlds[b], task[0], episodes[b], obs[b])
 
 
 @kernel

@@ -72,16 +72,16 @@ class TaskConfig(Model):
 
     action: ActionName = "default"
     observation: ObservationName = "tracks"
-    targets: int = Field(8, ge=1, le=64)  #: K nearest targets in the observation
-    sectors: int = Field(24, ge=4, le=360)  #: bearing sectors of ``sectors``
+    targets: int = Field(default=8, ge=1, le=64)  #: K nearest targets in the observation
+    sectors: int = Field(default=24, ge=4, le=360)  #: bearing sectors of ``sectors``
     flat: bool = True  #: False: a Dict space of own, targets and mask (or sectors)
-    range_scale: float = Field(1852.0, gt=0)  #: [m]
-    distance_scale: float = Field(1000.0, gt=0)  #: [m]
-    cross_track_scale: float = Field(100.0, gt=0)  #: [m]
-    target_speed_scale: float = Field(10.0, gt=0)  #: [m/s]
-    radius_scale: float = Field(100.0, gt=0)  #: [m]
-    rate_scale: float = Field(0.5, gt=0)  #: [rad/s]
-    safe_distance: float = Field(50.0, gt=0)  #: [m] hull to hull, where the proximity term begins
+    range_scale: float = Field(default=1852.0, gt=0)  #: [m]
+    distance_scale: float = Field(default=1000.0, gt=0)  #: [m]
+    cross_track_scale: float = Field(default=100.0, gt=0)  #: [m]
+    target_speed_scale: float = Field(default=10.0, gt=0)  #: [m/s]
+    radius_scale: float = Field(default=100.0, gt=0)  #: [m]
+    rate_scale: float = Field(default=0.5, gt=0)  #: [rad/s]
+    safe_distance: float = Field(default=50.0, gt=0)  #: [m] hull to hull, where the proximity term begins
     reward: RewardWeights = RewardWeights()
     end_on_collision: bool = True
     end_on_arrival: bool = True

@@ -1,0 +1,1 @@
+"""Truth: the record of a world and the kernels that move it."""

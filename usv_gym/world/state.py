@@ -233,8 +233,8 @@ def _ais(O: int, S: int) -> Dtype:
 def _nav(O: int) -> Dtype:
     """Own navigation of each observer, as measured.  ``next`` are ticks."""
     return np.dtype([
-        ("gnss_next", i8, (O,)), ("mru_next", i8, (O,)), ("imu_next", i8, (O,)), ("log_next", i8, (O,)), ("wind_next", i8, (O,)),
-        ("gnss_stamp_us", i8, (O,)),
+        ("gnss_next", i8, (O,)), ("mru_next", i8, (O,)), ("imu_next", i8, (O,)), ("log_next", i8, (O,)),
+        ("wind_next", i8, (O,)), ("gnss_stamp_us", i8, (O,)),
         ("position", f8, (O, 2)), ("heading", f8, (O,)), ("course", f8, (O,)), ("sog", f8, (O,)),
         ("mru_heading", f8, (O,)), ("yaw_rate", f8, (O,)),
         ("specific_force", f8, (O, 2)), ("imu_yaw_rate", f8, (O,)), ("imu_nu", f8, (O, 3)),  # last nu and its tick: internal
