@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from usv_gym.world.state import MODEL_KINEMATIC
 
 V = 8  #: vessel slots of the worlds below: obstacle i is source V + i
 NO_ROWS = np.zeros((0, 0, 4, 3))
-SILENT = {"std": 0.0}  #: an error that is none
+NO_NOISE = {"sensors": {}}  #: keys of a sea with the ranges and rates of the thesis and no errors
 
 
 def sea(B=1, *, first_seed=1, own_velocity=None, **keys: Any):
@@ -50,3 +51,31 @@ def watch(worlds, seconds, every, *paths):
                 field = field[name]
             samples.append(field.copy())
     return [np.array(samples) for samples in kept]
+
+
+def wrapped(angle):
+    """Angles within [-pi, pi)."""
+    return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def rms(error):
+    """Root mean square, leaving out NaN."""
+    return float(np.sqrt(np.nanmean(np.square(error))))
+
+
+def check_error(errors, noise, bias, decay, lags=(0, 1, 3)):
+    """Series of errors [T, ..] are white noise plus a bias that decays by ``decay`` from sample to sample.
+
+    Their autocovariance must agree within four standard deviations of its estimate (Bartlett 1946), which count how many
+    independent samples there are: of some hundred such checks none should fail by chance.
+    """
+
+    def expected(lag):
+        return bias**2 * decay ** np.abs(lag) + noise**2 * (lag == 0)
+
+    j = np.arange(-1000, 1001)
+    assert abs(errors.mean()) < 4.0 * math.sqrt(expected(j).sum() / errors.size)
+    for k in lags:
+        found = np.mean(errors[k:] * errors[: len(errors) - k])
+        spread = math.sqrt((expected(j) ** 2 + expected(j + k) * expected(j - k)).sum() / errors[k:].size)
+        assert abs(found - expected(np.array(k))) < 4.0 * spread, (k, found, expected(np.array(k)), spread)

@@ -381,7 +381,7 @@ def test_vessel_errors_are_one_line(tmp_path):
     text["damping"]["Nrx"] = 1.0
     file = tmp_path / "boat.yaml"
     file.write_text(json.dumps(text))
-    with pytest.raises(ValueError, match=r"boat.yaml: damping.Nrx: .*did you mean 'Nr") as error:
+    with pytest.raises(ValueError, match=r"boat.yaml:1: damping.Nrx: .*did you mean 'Nr") as error:
         load_vessel(file)
     assert "\n" not in str(error.value)
     with pytest.raises(ValueError, match="fluid_memory"):

@@ -26,7 +26,9 @@ def _pair(n1, e1, p1, l1, b1, n2, e2, p2, l2, b2):
     return (
         geometry.hull_hull(a, b),
         geometry.point_hull(a, n2, e2),
-        geometry.far_distance(n1, e1, p1, l1, b1, n2, e2, p2, l2, b2),
+        geometry.far_distance(
+            n1 - n2, e1 - e2, math.sin(p1), math.cos(p1), l1, b1, math.sin(p2), math.cos(p2), l2, b2
+        ),
     )
 
 

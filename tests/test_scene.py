@@ -138,7 +138,7 @@ def test_what_a_snapshot_shows():
     assert len(scene.all(Polygon, "shadow")) == 2
     assert [c.radius for c in scene.all(Circle, "ring_radar")] == [500.0]
     assert [c.radius for c in scene.all(Circle, "ring_lidar")] == [120.0]
-    assert [c.radius for c in scene.all(Circle, "acceptance")] == [20.0, 20.0]
+    assert [c.radius for c in scene.all(Circle, "acceptance")] == [20.0]  # the start has none
     disc = scene.all(Circle, "detection")[0]
     assert disc.centre == (3.0, 204.0)
     assert disc.radius == 12.0

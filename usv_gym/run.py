@@ -99,7 +99,7 @@ def run(mission: Mission, progress: Progress | None = None) -> Episode:
         core.task["max_steps"] = steps
         core.reset(_ONE, [np_random(mission.seed)[0]])
     recorder = Recorder()
-    orders = Commands(core.worlds, 0, list(core.names), core.scenario)
+    orders = Commands(core.worlds, 0, core.ids(0), core.scenario)
     recorder.sample(core.worlds)
     if controller is not None:
         controller.reset({**core.info(0), "scales": core.scales()})
@@ -129,7 +129,7 @@ def run(mission: Mission, progress: Progress | None = None) -> Episode:
     if rows is not None and outcome == "time_limit":
         outcome = "log_end"
     return recorder.finish(
-        names=orders.names,
+        names=orders.called,
         scenario=mission.scenario.dump(),
         seed=mission.seed,
         policy=mission.policy,
@@ -162,7 +162,7 @@ def resimulate(episode: Episode) -> Episode:
     core.reset(_ONE, [np_random(meta["seed"])[0]])
     recorder = Recorder()
     recorder.sample(core.worlds)
-    orders = Commands(core.worlds, 0, list(core.names), core.scenario)
+    orders = Commands(core.worlds, 0, core.ids(0), core.scenario)
     waiting = [tuple(order) for order in meta.get("orders", [])]
     for action in episode.actions:
         while waiting and waiting[0][0] <= int(core.worlds["tick"][0]):
@@ -174,7 +174,7 @@ def resimulate(episode: Episode) -> Episode:
             core.step(_ONE)
         recorder.sample(core.worlds)
     return recorder.finish(
-        names=orders.names, scenario=meta["scenario"], seed=meta["seed"], policy=meta["policy"], vessel=meta["vessel"]
+        names=orders.called, scenario=meta["scenario"], seed=meta["seed"], policy=meta["policy"], vessel=meta["vessel"]
     )
 
 

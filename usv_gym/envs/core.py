@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +18,7 @@ from ..scenarios.build import build_worlds, write_weather
 from ..scenarios.loader import Source, load_scenario
 from ..scenarios.schema import Scenario, Weather
 from ..tasks.task import (
+    DISCRETE,
     N_TERMS,
     OUTCOMES,
     TERMS,
@@ -33,17 +35,22 @@ from ..units import DEG
 from ..world.disturbance import set_weather
 from ..world.state import A
 from ..world.vessel import VesselModel, load_vessel
+from .threads import Crew
 
 #: template of the family ``open_sea``: everything but what the family draws
 OPEN_SEA: dict[str, Any] = {
     "name": "open_sea",
-    "simulation": {"dt": 0.1, "traffic_interval": 0.5, "control_interval": 1.0, "duration": 500.0, "area": 2000.0},
+    "simulation": {"dt": 0.1, "traffic_interval": 0.5, "control_interval": 1.0, "area": 2000.0},
     "sensors": {
         "base": "thesis",
         # own navigation as often as the tick
         "navigation": {key: {"rate": 10.0} for key in ("gnss", "mru", "imu", "speed_log", "wind")},
     },
 }
+#: [m] what a vessel can sail at cruising speed before time is up; the longest route is 1350 m
+OPEN_SEA_REACH = 2500.0
+_OUTCOME_TEXTS = np.array(OUTCOMES, object)
+_WORTH_SHARING = 16  # rows; fewer are done by one thread before another wakes up
 NO_ROWS = np.zeros((0, 0, A, 3))
 _WEATHERS = ("calm", "random", "thesis")
 
@@ -79,9 +86,14 @@ class Core:
     weather
         ``calm``, ``random``, ``thesis`` or a mapping like ``weather`` of a scenario; None: the scenario's own (the family:
         ``random``).
+    max_steps
+        most control steps of an episode; None: as many as the scenario's duration holds.
+    num_threads
+        threads that share the rows of a large batch.
     """
 
     worlds: NDArray[Any]
+    action_space: gym.Space[Any]
     names: list[str]
     scenario: Scenario
     model: VesselModel
@@ -96,97 +108,122 @@ class Core:
         overrides: Sequence[str] = (),
         difficulty: float = 0.5,
         weather: str | Mapping[str, Any] | None = None,
+        max_steps: int | None = None,
+        num_threads: int = 1,
     ) -> None:
         self.num = num
         self.config = config
         self.overrides = tuple(overrides)
-        self.difficulty = check_difficulty(difficulty)
-        self.weather = weather
+        self.difficulty = np.full(num, check_difficulty(difficulty))  # [B]
+        self.weather = [check_weather(weather)] * num  # [B]
+        self.max_steps = max_steps
+        self.crew = Crew(num_threads)
         self._load(source, vessel)
-        facts = vessel_facts(self.model)
-        self.action_name = resolve_action(config, facts)
-        self.action_space = action_space(config, facts)
         self.observation_space = observation_space(config)
         self.obs = np.zeros((num, observation_size(config)), np.float32)
         self.terms = np.zeros((num, N_TERMS))
         self.reward = np.zeros(num)
         self.terminated = np.zeros(num, np.bool_)
         self.truncated = np.zeros(num, np.bool_)
-        self.actions = np.zeros((num, 1 if self.action_name == "discrete" else self.action_space.shape[0]))  # type: ignore[index]
+        self.actions = np.zeros((num, 1 if self.config.action == "discrete" else self.action_space.shape[0]))  # type: ignore[index]
         self.episodes = np.zeros(num, episode_dtype())
         self._what = np.zeros(num, np.int8)
 
     # --- set-up ------------------------------------------------------------------------------------------------------
     def _load(self, source: Source | None, vessel: str | None) -> None:
         """(Re)build template and worlds for a scenario; all rows become fresh."""
-        self.source, self.vessel = source, vessel
-        self.scenario = load_scenario(OPEN_SEA if source is None else source, overrides=self.overrides, vessel=vessel)
-        self.model = load_vessel(self.scenario.own_ship.vessel)
-        self.worlds, self.names = build_worlds(self.scenario, self.num)
-        self._bytes = self.worlds.view(np.uint8).reshape(self.num, -1)
-        self._template = self._bytes[0].copy()
+        scenario = load_scenario(OPEN_SEA if source is None else source, overrides=self.overrides, vessel=vessel)
+        model = load_vessel(scenario.own_ship.vessel)
+        if source is None:
+            time = f"simulation.duration={float(np.ceil(OPEN_SEA_REACH / model.cruise_speed))}"
+            scenario = load_scenario(OPEN_SEA, overrides=(time, *self.overrides), vessel=vessel)
+        facts = vessel_facts(model)
+        self.config = self.config.model_copy(update={"action": resolve_action(self.config, facts)})
+        space = action_space(self.config, facts)
+        if space != getattr(self, "action_space", space):
+            raise ConfigError(
+                f"vessel {model.name!r} has another action space; make the environment with vessel={model.name!r}, "
+                "or with action='throttle_nozzle', 'heading_speed' or 'discrete', which fit every vessel"
+            )
+        worlds, names = build_worlds(scenario, self.num)
+        # nothing is changed until all of it is known to be right
+        self.source, self.vessel, self.scenario, self.model = source, vessel, scenario, model
+        self.worlds, self.names, self.action_space = worlds, names, space
         simulation = self.scenario.simulation
         self.control_interval = simulation.control_ticks * simulation.dt
         max_steps = int(np.ceil(simulation.duration / self.control_interval - 1e-9))
-        self.task = task_record(self.config, vessel_facts(self.model), simulation.control_ticks, max_steps)
+        if self.max_steps is not None:
+            max_steps = min(max_steps, self.max_steps)
+        self.task = task_record(self.config, facts, simulation.control_ticks, max_steps)
         if self.config.observation == "truth":
             # nobody looks at the picture, so nobody has to paint it
             self.worlds["sensors"]["exteroceptive"] = 0
-            self._template = self._bytes[0].copy()
+        self._template = self._bytes[0].copy()
 
-    def configure(self, options: Mapping[str, Any] | None) -> None:
-        """Apply ``reset(options=...)``: scenario, vessel, weather, difficulty.
+    @property
+    def _bytes(self) -> NDArray[np.uint8]:
+        """The worlds as bytes [B, n]: a view."""
+        return self.worlds.view(np.uint8).reshape(self.num, -1)
+
+    def ids(self, b: int) -> list[str]:
+        """Ids of the sources of row b [S], "" where a slot is empty; what a family drew is called ship_1, obstacle_1, ..."""
+        w = self.worlds[b]
+        V = len(w["vessels"]["active"])
+        active = np.concatenate([w["vessels"]["active"], w["obstacles"]["active"]])
+        drawn = [f"ship_{s}" if s < V else f"obstacle_{s - V + 1}" for s in range(len(active))]
+        return [name or (drawn[s] if active[s] else "") for s, name in enumerate(self.names)]
+
+    def configure(self, options: Mapping[str, Any] | None, mask: NDArray[np.bool_] | None = None) -> None:
+        """Apply ``reset(options=...)`` to the rows of ``mask`` [B], or to all: scenario, vessel, weather, difficulty.
 
         Raises
         ------
         ConfigError
-            for an unknown key, a bad value, or a vessel that does not fit the action space.
+            for an unknown key, a bad value, a vessel that does not fit the action space, or a scenario or vessel for some
+            rows only.
         """
         if not options:
             return
         unknown = [key for key in options if key not in ("scenario", "vessel", "weather", "difficulty")]
         if unknown:
             raise ConfigError(f"reset options: unknown key {unknown[0]!r}; known are scenario, vessel, weather, difficulty")
-        if "difficulty" in options:
-            self.difficulty = check_difficulty(options["difficulty"])
-        if "weather" in options:
-            check_weather(options["weather"])
-            self.weather = options["weather"]
+        difficulty = check_difficulty(options["difficulty"]) if "difficulty" in options else None
+        weather = check_weather(options.get("weather"))
         if "scenario" in options or "vessel" in options:
-            before = self.source, self.vessel
+            if mask is not None and not mask.all():
+                raise ConfigError("reset options: all rows share scenario and vessel; give them in a reset of all rows")
             self._load(options.get("scenario", self.source), options.get("vessel", self.vessel))
-            if action_space(self.config, vessel_facts(self.model)) != self.action_space:
-                name = self.model.name
-                self._load(*before)
-                raise ConfigError(
-                    f"reset options: vessel {name!r} has another action space; make the environment with "
-                    f"vessel={name!r}, or with action='heading_speed' or 'discrete', which fit every vessel"
-                )
+        for b in range(self.num) if mask is None else np.flatnonzero(mask).tolist():
+            if difficulty is not None:
+                self.difficulty[b] = difficulty
+            if "weather" in options:
+                self.weather[b] = weather
 
     # --- running -----------------------------------------------------------------------------------------------------
     def reset(self, mask: NDArray[np.bool_], generators: Sequence[np.random.Generator]) -> None:
         """Draw and start new episodes in the rows of ``mask`` [B]; generators [B] own the randomness."""
         from ..scenarios.families import sample_open_sea
+
+        rows = self._bytes
         for b in np.flatnonzero(mask).tolist():
-            self._bytes[b] = self._template
+            rows[b] = self._template
             self.worlds["seed"][b] = generators[b].integers(0, 1 << 63, dtype=np.uint64)
             self._set_weather(b, generators[b])
         if self.source is None:
-            difficulty = np.full(self.num, self.difficulty)
-            sample_open_sea(self.worlds, mask, difficulty, self.model.cruise_speed)
+            sample_open_sea(self.worlds, mask, self.difficulty, self.model.cruise_speed)
         self._what[:] = mask  # BEGIN is 1
         self._run(NO_ROWS)
 
     def _set_weather(self, b: int, generator: np.random.Generator) -> None:
         """Overwrite the weather of row b where the caller or the family asks for it."""
-        weather = self.weather
+        weather = self.weather[b]
         if weather is None:
-            if self.source is not None or self.overrides:
+            if self.source is not None or any(o.strip().startswith("weather") for o in self.overrides):
                 return
             weather = "random"
         original = self.scenario.preset == "original"
-        if isinstance(weather, Mapping):
-            write_weather(validate(Weather, Document("weather", dict(weather))), self.worlds[b], self.scenario.preset)
+        if isinstance(weather, Weather):
+            write_weather(weather, self.worlds[b], self.scenario.preset)
             return
         if weather == "calm":
             set_weather(self.worlds[b], original=original)
@@ -194,7 +231,7 @@ class Core:
             set_weather(self.worlds[b], wind_speed=10.0, wind_to=270 * DEG, current_speed=0.5, current_to=90 * DEG,
                         wave_height=2.0, wave_to=270 * DEG, original=original)  # fmt: skip
         else:
-            d = self.difficulty
+            d = float(self.difficulty[b])
             wind, current, height, way, drift = generator.random(5)
             set_weather(self.worlds[b], wind_speed=12.0 * d * wind, wind_to=2 * np.pi * way,
                         current_speed=0.6 * d * current, current_to=2 * np.pi * drift,
@@ -206,20 +243,34 @@ class Core:
         Raises
         ------
         ValueError
-            if an action is not finite; nothing has moved then.
+            if an action is not finite, or none of ``discrete``; nothing has moved then.
         """
         self._what[:] = mask
         self._what *= 2  # STEP
         bad = self._run(rows)
         if bad >= 0:
-            raise ValueError(f"action {self.actions[bad].tolist()} is not finite" + (f" (row {bad})" if self.num > 1 else ""))
+            expected = "a whole number from 0 to 4" if self.config.action == "discrete" else "finite numbers"
+            row = f" (row {bad})" if self.num > 1 else ""
+            raise ValueError(f"action {self.actions[bad].tolist()}{row}: expected {expected}")
 
     def _run(self, rows: NDArray[np.float64]) -> int:
+        batch = (self.worlds, self.episodes, self._what, self.actions, self.obs, self.terms, self.reward, self.terminated,
+                 self.truncated)  # fmt: skip
+        if self.crew.size == 1 or np.count_nonzero(self._what) < _WORTH_SHARING or not self._plausible():
+            return self._kernel(rows, *batch)
+        self.crew.share(self.num, lambda part: self._kernel(rows, *(array[part] for array in batch)))
+        return -1
+
+    def _kernel(self, rows: Any, worlds: Any, episodes: Any, what: Any, actions: Any, *results: Any) -> int:
         from ..tasks.step import run_batch
 
-        bad: int = run_batch(self.worlds, self.task, self.episodes, self._what, self.actions, rows, self.obs, self.terms,
-                             self.reward, self.terminated, self.truncated)  # fmt: skip
+        bad: int = run_batch(worlds, self.task, episodes, what, actions, rows, *results)
         return bad
+
+    def _plausible(self) -> bool:
+        """Whether all actions can be carried out; if not, one call has to find the bad row before any row moves."""
+        return bool((np.isin(self.actions, range(len(DISCRETE))) if self.config.action == "discrete"
+                     else np.isfinite(self.actions)).all())  # fmt: skip
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""
@@ -255,6 +306,32 @@ class Core:
             "is_success": outcome == "arrival",
         }
 
+    def infos(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
+        """The info dicts of the rows of ``mask`` [B] as Gymnasium's vector environments batch them.
+
+        Every key has an array [B], with zeros (None among texts) in the other rows, and a mask under ``_key``.
+        """
+        terms = self.terms.T.copy()
+        outcome = self.episodes["outcome"]
+        columns = {
+            "time": self.worlds["tick"] * self.worlds["dt"],
+            "closest": self.episodes["closest"].copy(),
+            "to_go": self.episodes["to_go"].copy(),
+            "outcome": _OUTCOME_TEXTS[outcome],
+            "is_success": outcome == OUTCOMES.index("arrival"),
+        }
+        if not mask.all():
+            others = ~mask
+            terms[:, others] = 0.0
+            for key, column in columns.items():
+                column[others] = None if key == "outcome" else 0
+        return masked({"reward_terms": masked(dict(zip(TERMS, terms, strict=True)), mask), **columns}, mask)
+
+
+def masked(columns: Mapping[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
+    """Columns, each followed by the mask of the rows that it speaks for, under ``_key``."""
+    return {name: value for key, column in columns.items() for name, value in ((key, column), (f"_{key}", mask))}
+
 
 def check_difficulty(value: Any) -> float:
     """Difficulty as a float in [0, 1]; ConfigError otherwise."""
@@ -263,7 +340,10 @@ def check_difficulty(value: Any) -> float:
     return float(value)
 
 
-def check_weather(value: Any) -> None:
-    """ConfigError unless the value names or describes a weather."""
-    if value is not None and not isinstance(value, Mapping) and value not in _WEATHERS:
-        raise ConfigError(f"weather: expected one of {', '.join(_WEATHERS)} or a mapping, got {value!r}")
+def check_weather(value: Any) -> str | Weather | None:
+    """A weather by name or, from a mapping, in full; ConfigError otherwise."""
+    if isinstance(value, Mapping):
+        return validate(Weather, Document("weather", dict(value)))
+    if value is None or isinstance(value, Weather) or (isinstance(value, str) and value in _WEATHERS):
+        return value
+    raise ConfigError(f"weather: expected one of {', '.join(_WEATHERS)} or a mapping, got {value!r}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from ..scenarios.commands import Commands
 from ..scenarios.loader import Source
 from ..tasks.task import TaskConfig, unflatten
-from .core import Core, check_weather
+from .core import Core
 from .notice import compiling
 
 _ONE = np.ones(1, np.bool_)
@@ -102,15 +103,15 @@ class USVEnv(gym.Env[Any, Any]):
 
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode: expected one of {self.metadata['render_modes']}, got {render_mode!r}")
-        check_weather(weather)
         config = validate(TaskConfig, Document("environment arguments", {**task, "reward": dict(reward or {})}))
+        self.metadata = copy.deepcopy(self.metadata)  # one's own: Gymnasium's wrappers write into it
         self.render_mode = render_mode
         with compiling():
             self.core = Core(1, source=scenario, config=config, vessel=vessel, overrides=overrides, difficulty=difficulty,
                              weather=weather)  # fmt: skip
         self.action_space = self.core.action_space
         self.observation_space = self.core.observation_space
-        self._discrete = self.core.action_name == "discrete"
+        self._action_shape = self.action_space.shape
         self._started = False
         self._commands: Commands | None = None
         self._history: Any = None
@@ -143,9 +144,13 @@ class USVEnv(gym.Env[Any, Any]):
             raise gym.error.ResetNeeded("call reset() before step()")
         core = self.core
         try:
-            core.actions[0] = action
+            fits = np.shape(action) == self._action_shape
+            if fits:
+                core.actions[0] = action
         except (ValueError, TypeError):
-            raise ValueError(f"action {action!r} does not fit {self.action_space}") from None
+            fits = False
+        if not fits:
+            raise ValueError(f"action {' '.join(repr(action).split())} does not fit {self.action_space}")
         core.step(_ONE)
         return (self._observation(), float(core.reward[0]), bool(core.terminated[0]), bool(core.truncated[0]),
                 core.info(0))  # fmt: skip
@@ -160,14 +165,14 @@ class USVEnv(gym.Env[Any, Any]):
 
         if self._history is None:
             self._history = History()
-        names = self._commands.names if self._commands else self.core.names
+        names = self._commands.names if self._commands else self.core.ids(0)
         return render(scene_from_snapshot(self.core.worlds[0], names, self._history), size=(800, 800))
 
     @property
     def commands(self) -> Commands:
         """Commands to the running world: spawn, delete, move, set_waypoints, set_ais; and its notices."""
         if self._commands is None:
-            self._commands = Commands(self.core.worlds, 0, list(self.core.names), self.core.scenario)
+            self._commands = Commands(self.core.worlds, 0, self.core.ids(0), self.core.scenario)
         return self._commands
 
     @property

@@ -72,7 +72,7 @@ class Avoid(Waypoints):
     def reset(self, info: dict[str, Any]) -> None:
         """Forget the last course."""
         super().reset(info)
-        self.margin = 20.0 + 2.0 * self.scales["length"]
+        self.margin = 10.0 + self.scales["length"]
         self.last = 0.0
         self.offset, self.share = (grid.ravel() for grid in np.meshgrid(self.OFFSETS, self.SHARES, indexing="ij"))
 

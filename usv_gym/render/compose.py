@@ -149,7 +149,8 @@ def _route(layers: Layers, sea: Sea) -> None:
     if len(sea.route) == 0:
         return
     layers["route"].append(Polyline(sea.route, "route"))
-    for k, (north, east) in enumerate(sea.route, start=1):
+    # the first is where the route starts
+    for k, (north, east) in enumerate(sea.route[1:], start=1):
         at = (float(north), float(east))
         if sea.acceptance > 0.0:
             layers["route"].append(Circle(at, sea.acceptance, "acceptance"))

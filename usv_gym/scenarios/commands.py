@@ -50,6 +50,8 @@ class Commands:
     log: list[tuple[int, str, dict[str, Any]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        #: what each source is, or was last, called
+        self.called = list(self.names)
         self._reached = self._w["routes"]["reached"].copy()
         self._done = self._w["routes"]["done"].copy()
 
@@ -93,7 +95,7 @@ class Commands:
             write_obstacle(scenario, self._w, slot, id, mmsi)
             self._w["obstacles"]["frame_position"][slot] = self._w["obstacles"]["position"][slot]
         self._listen(source)
-        self.names[source] = id
+        self.names[source] = self.called[source] = id
         self._note("spawned", source, "spawn", {"id": id, "spec": dict(spec)})
         return source
 
@@ -182,7 +184,7 @@ class Commands:
         return self.worlds[self.b]
 
     def _notice(self, kind: str, source: int, text: str = "") -> Notice:
-        return Notice(float(self._w["tick"] * self._w["dt"]), kind, self.names[source], text, source)
+        return Notice(float(self._w["tick"] * self._w["dt"]), kind, self.called[source], text, source)
 
     def _note(self, kind: str, source: int, command: str, arguments: dict[str, Any]) -> None:
         self._pending.append(self._notice(kind, source, json.dumps(arguments)))

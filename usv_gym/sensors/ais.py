@@ -17,6 +17,7 @@ from ..jit import inner
 from ..trig import wrap, wrap_positive
 from ..units import DEG, DEG_PER_MIN, KNOT
 from ..world.state import AIS_ATON, AIS_CLASS_A, AIS_CLASS_B
+from .noise import noise_slot, pair_slot
 
 NEVER = 1 << 60  #: a tick that does not come
 _SECOND = 1_000_000
@@ -81,7 +82,7 @@ def schedule(w, s, tick):
     V = w.vessels.active.shape[0]
     speed = w.vessels.nu[s, 0] if s < V else 0.0
     interval = reporting_interval_us(ais_class(w, s), speed, 0.0, w.sensors.ais_interval_us)
-    wait = np.int64(rng.uniform(w.seed, rng.AIS_PHASE, s, tick) * interval) // w.dt_us + 1
+    wait = np.int64(rng.uniform(w.seed, rng.AIS_PHASE, noise_slot(w, s), tick) * interval) // w.dt_us + 1
     a.next_tick[s] = tick + wait
 
 
@@ -106,12 +107,13 @@ def transmit(w, s, tick):
     seconds = (tick - a.last_tick[s]) * w.dt
     fresh = a.last_tick[s] < 0
     a.last_tick[s] = tick
-    b0, b1 = rng.normal2(w.seed, rng.AIS_BIAS, s * 4, tick)
-    b2, b3 = rng.normal2(w.seed, rng.AIS_BIAS, s * 4 + 1, tick)
-    b4, b5 = rng.normal2(w.seed, rng.AIS_BIAS, s * 4 + 2, tick)
-    n0, n1 = rng.normal2(w.seed, rng.AIS_NOISE, s * 4, tick)
-    n2, n3 = rng.normal2(w.seed, rng.AIS_NOISE, s * 4 + 1, tick)
-    n4, n5 = rng.normal2(w.seed, rng.AIS_NOISE, s * 4 + 2, tick)
+    slot = 4 * noise_slot(w, s)
+    b0, b1 = rng.normal2(w.seed, rng.AIS_BIAS, slot, tick)
+    b2, b3 = rng.normal2(w.seed, rng.AIS_BIAS, slot + 1, tick)
+    b4, b5 = rng.normal2(w.seed, rng.AIS_BIAS, slot + 2, tick)
+    n0, n1 = rng.normal2(w.seed, rng.AIS_NOISE, slot, tick)
+    n2, n3 = rng.normal2(w.seed, rng.AIS_NOISE, slot + 1, tick)
+    n4, n5 = rng.normal2(w.seed, rng.AIS_NOISE, slot + 2, tick)
     drive = (b0, b1, b2, b3, b4, b5)
     for k in range(6):
         if fresh or p.ais_bias_time[k] <= 0.0:
@@ -178,7 +180,7 @@ def _receive(w, s, tick):
         dn, de = north - w.vessels.eta[own, 0], east - w.vessels.eta[own, 1]
         if dn * dn + de * de > p.ais_range * p.ais_range:
             continue
-        slot = s * w.observer.shape[0] + o
+        slot = pair_slot(w, o, s)
         if p.ais_loss > 0.0 and rng.uniform(w.seed, rng.AIS_LOSS, slot, tick) < p.ais_loss:
             continue
         latency = p.ais_latency_us

@@ -13,6 +13,7 @@ import math
 from .. import rng
 from ..jit import inner, spliced
 from ..world.state import LIDAR, RADAR
+from .noise import pair_slot
 from .shadow import apparent_half_width, cast_shadows, look_around
 from .tdm import take_scan
 
@@ -36,8 +37,7 @@ def deliver(w, o, k, tick):
 def _error(w, o, k, s, tick, noise, bias, bias_time, stream_bias, stream_noise):
     """Error (N, E, radius) of a scan at f(d) = 1: drifting bias plus white noise."""
     t = w.tracks
-    O = w.observer.shape[0]
-    slot = (s * O + o) * 2
+    slot = 2 * pair_slot(w, o, s)
     b0, b1 = rng.normal2(w.seed, stream_bias, slot, tick)
     b2, n2 = rng.normal2(w.seed, stream_bias, slot + 1, tick)
     n0, n1 = rng.normal2(w.seed, stream_noise, slot, tick)
@@ -80,9 +80,7 @@ def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detect
         detection = sensor.detection * w.weather.detection_factor
         if sensor.detection_radius > 0.0:
             detection *= shown * shown / (shown * shown + sensor.detection_radius * sensor.detection_radius)
-        if detection < 1.0 and rng.uniform(
-            w.seed, stream_detection, s * w.observer.shape[0] + o, tick
-        ) >= detection:
+        if detection < 1.0 and rng.uniform(w.seed, stream_detection, pair_slot(w, o, s), tick) >= detection:
             continue
         en, ee, er = _error(w, o, k, s, tick, sensor.noise, sensor.bias, sensor.bias_time, stream_bias, stream_noise)
         f = sensor.gain * d

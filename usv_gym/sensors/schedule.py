@@ -49,28 +49,37 @@ def _due(tick, dt_us, period_us):
 
 @spliced
 def sense(w, tick):
-    """Fire everything that is due at ``tick``: transmissions, receptions, scans, then the TDM's report."""
+    """Fire everything that is due at ``tick``: transmissions, receptions, scans, then the TDM's report.
+
+    There is room for one message of each source and for one scan under way: what is later than that arrives just before
+    the next one is made.
+    """
     p = w.sensors
     S = w.ais.next_tick.shape[0]
-    for s in range(S):
-        if tick >= w.ais.next_tick[s]:
-            transmit(w, s, tick)
     radar = p.radar.on and _due(tick, w.dt_us, p.radar.period_us)
     lidar = p.lidar.on and _due(tick, w.dt_us, p.lidar.period_us)
     report = _due(tick, w.dt_us, p.tdm_period_us)
-    for o in range(w.observer.shape[0]):
-        if w.vessels.active[w.observer[o]] == 0:
-            continue
-        for s in range(S):
-            if 0 <= w.ais.due_tick[o, s] <= tick:
-                w.ais.due_tick[o, s] = -1
-                take_ais(w, o, s)
-        if radar:
-            scan_radar(w, o, tick)
-        if lidar:
-            scan_lidar(w, o, tick)
-        for k in range(2):
-            deliver(w, o, k, tick)
-        if report:
-            publish(w, o, tick)
+    for make_room in (True, False):
+        if not make_room:
+            for s in range(S):
+                if tick >= w.ais.next_tick[s]:
+                    transmit(w, s, tick)
+        for o in range(w.observer.shape[0]):
+            if w.vessels.active[w.observer[o]] == 0:
+                continue
+            for s in range(S):
+                due = w.ais.due_tick[o, s]
+                if due >= 0 and (due <= tick or (make_room and tick >= w.ais.next_tick[s])):
+                    w.ais.due_tick[o, s] = -1
+                    take_ais(w, o, s)
+            if not make_room:
+                if radar:
+                    scan_radar(w, o, tick)
+                if lidar:
+                    scan_lidar(w, o, tick)
+            for k in range(2):
+                fires = radar if k == 0 else lidar
+                deliver(w, o, k, NEVER if make_room and fires else tick)
+            if report and not make_room:
+                publish(w, o, tick)
     _set_next(w, tick)

@@ -37,7 +37,7 @@ def begin_episode(w, task, episode):
     episode.step = 0
     episode.to_go = distance_to_go(w, own)
     episode.heading_ref = w.nav.mru_heading[0]
-    episode.speed_ref = w.vessels.nu[own, 0]
+    episode.speed_ref = max(w.nav.water_speed[0, 0], 0.0)
     for c in range(episode.last_action.shape[0]):
         episode.last_action[c] = 0.0
     episode.closest = 1.0e9
@@ -82,6 +82,7 @@ def step_task(w, task, episode, action, rows, terms):
     change = _decode(w, task, episode, action)
     piloted = task.action != ACTION_DEMAND and task.action != ACTION_CHANNELS
     w.safety.step_closest[0] = 1.0e9
+    had_collided, had_arrived = w.safety.collided_with[0] >= 0, w.routes.done[own] != 0
     for k in range(task.control_ticks):
         if piloted:
             surge, yaw = autopilot(w, p, w.nav.mru_heading[0], w.nav.yaw_rate[0], w.nav.water_speed[0, 0],
@@ -113,8 +114,8 @@ def step_task(w, task, episode, action, rows, terms):
     arrival = r.count[own] > 0 and r.done[own] != 0
     half = w.area[0]
     outside = half > 0.0 and (abs(w.vessels.eta[own, 0]) > half or abs(w.vessels.eta[own, 1]) > half)
-    terms[5] = -1.0 if collision else 0.0
-    terms[6] = 1.0 if arrival and not collision else 0.0
+    terms[5] = -1.0 if collision and not had_collided else 0.0
+    terms[6] = 1.0 if arrival and not had_arrived and not collision else 0.0
     terms[7] = -1.0 if outside else 0.0
     reward = 0.0
     for i in range(terms.shape[0]):
@@ -137,13 +138,14 @@ def run_batch(worlds, task, episodes, what, actions, rows, obs, terms, reward, t
 
     worlds [B], task [1], episodes [B], actions [B, n] float64, rows [ticks, n, A, 3] (see engine.advance_worlds),
     obs [B, size] float32, terms [B, N_TERMS], reward [B], terminated [B], truncated [B]; the last five are written.
-    Returns -1, or the first row whose action is not finite; then nothing at all has moved.  (One entry point for both,
-    because what they share is then compiled once.)
+    Returns -1, or the first row whose action is not finite or none of ``discrete``; then nothing at all has moved.  (One
+    entry point for both, because what they share is then compiled once.)
     """
     for b in range(worlds.shape[0]):
         if what[b] == STEP:
             for c in range(actions.shape[1]):
-                if not math.isfinite(actions[b, c]):
+                a = actions[b, c]
+                if not math.isfinite(a) or (task[0].action == ACTION_DISCRETE and not (a == math.floor(a) and 0.0 <= a < 5.0)):
                     return b
     for b in range(worlds.shape[0]):
         if what[b] == BEGIN:

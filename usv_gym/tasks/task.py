@@ -62,7 +62,7 @@ class RewardWeights(Model):
     proximity: float = 1.0  #: -(1 - closest / safe distance)^2 inside the safe distance, else 0
     effort: float = 0.02  #: -mean squared change of the action
     time: float = 0.05  #: -1 each step
-    collision: float = 50.0  #: -1 on contact
+    collision: float = 50.0  #: -1 on first contact
     arrival: float = 20.0  #: +1 when the last waypoint is reached
     out_of_area: float = 20.0  #: -1 when the area is left
 

@@ -107,17 +107,15 @@ def half_width(length, beam, aspect):
 
 
 @inner
-def far_distance(n1, e1, psi1, l1, b1, n2, e2, psi2, l2, b2):
+def far_distance(dn, de, s1, c1, l1, b1, s2, c2, l2, b2):
     """Distance of two hulls that are far apart [m]: the other hull as a capsule, the own one by its extent towards it.
 
-    Within 2 % of the exact distance beyond CLOSE plus the half lengths.  A disc is l2 = b2 = its diameter.
+    dn, de [m] lead from the other hull to the own one; s1, c1, s2, c2 are sine and cosine of the headings.  A disc is
+    l2 = b2 = its diameter.  Within 2 % of the exact distance, plus a share of the beams, beyond CLOSE.
     """
-    s2, c2 = sincos(psi2)
     axis = 0.5 * max(l2 - b2, 0.0)
-    dn, de = n1 - n2, e1 - e2
     t = min(max(dn * c2 + de * s2, -axis), axis)
     rn, re = dn - t * c2, de - t * s2
-    r = math.hypot(rn, re)
-    s1, c1 = sincos(psi1)
+    r = math.sqrt(rn * rn + re * re)
     along = abs(rn * c1 + re * s1) * 0.5 * l1 + abs(re * c1 - rn * s1) * 0.5 * b1
     return max(r - 0.5 * b2 - (along / r if r > 0.0 else 0.0), 0.0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from ..jit import inner
+from ..trig import sincos
 from .geometry import CLOSE, CONTACT_STEP, far_distance, hull_hull, hull_vertices, point_hull
 
 
@@ -28,41 +29,18 @@ def begin_frame(w):
 
 
 @inner
-def _closest_in_frame(w, o, j, s, seconds):
-    """Smallest distance [m] of the hulls of vessel j and source s within the frame, and their distance at its end."""
-    v, m = w.vessels, w.obstacles
-    V = v.active.shape[0]
-    disc = s >= V
-    i = s - V
-    # both as straight lines over the frame: n + dn t, heading psi + dp t, t in [0, 1]
+def _follow(w, j, s, disc, l2, b2, n2, e2, p2, dn2, de2, dp2):
+    """Smallest and last distance [m] of the hulls of vessel j and source s over the frame, by conservative advancement.
+
+    The other hull moves from (n2, e2, p2) by (dn2, de2, dp2); both are straight lines over t in [0, 1].
+    """
+    v = w.vessels
     n1, e1, p1 = v.frame_eta[j, 0], v.frame_eta[j, 1], v.frame_eta[j, 2]
     dn1, de1, dp1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1, v.eta[j, 2] - p1
-    if disc:
-        n2, e2, p2 = m.frame_position[i, 0], m.frame_position[i, 1], 0.0
-        dn2, de2, dp2 = m.position[i, 0] - n2, m.position[i, 1] - e2, 0.0
-        l2 = b2 = 2.0 * m.radius[i]
-        reach2 = m.radius[i]
-    else:
-        n2, e2, p2 = v.frame_eta[s, 0], v.frame_eta[s, 1], v.frame_eta[s, 2]
-        dn2, de2, dp2 = v.eta[s, 0] - n2, v.eta[s, 1] - e2, v.eta[s, 2] - p2
-        l2, b2 = v.length[s], v.beam[s]
-        reach2 = 0.5 * math.hypot(l2, b2)
     l1, b1 = v.length[j], v.beam[j]
-    reach1 = 0.5 * math.hypot(l1, b1)
-    rn, re = n1 - n2, e1 - e2
-    vn, ve = dn1 - dn2, de1 - de2
-    travelled2 = vn * vn + ve * ve
-    t = min(max(-(rn * vn + re * ve) / travelled2, 0.0), 1.0) if travelled2 > 0.0 else 0.0
-    gap = math.hypot(rn + t * vn, re + t * ve) - reach1 - reach2
-    if gap > CLOSE:
-        end = far_distance(n1 + dn1, e1 + de1, p1 + dp1, l1, b1, n2 + dn2, e2 + de2, p2 + dp2, l2, b2)
-        near = end
-        if t < 1.0:
-            near = min(near, far_distance(n1 + t * dn1, e1 + t * de1, p1 + t * dp1, l1, b1,
-                                          n2 + t * dn2, e2 + t * de2, p2 + t * dp2, l2, b2))
-        return near, end
     # fastest that any two points of the hulls can close, per frame
-    closing = math.sqrt(travelled2) + abs(dp1) * reach1 + abs(dp2) * reach2 + 1.0e-9
+    closing = math.hypot(dn1 - dn2, de1 - de2) + abs(dp1) * 0.5 * math.hypot(l1, b1) + abs(dp2) * 0.5 * math.hypot(l2, b2)
+    closing += 1.0e-9
     least = CONTACT_STEP / closing
     near = math.inf
     t = 0.0
@@ -83,21 +61,47 @@ def _closest_in_frame(w, o, j, s, seconds):
 @inner
 def sweep(w):
     """Distances of every observer's hull to every source over the frame that ends now."""
-    v = w.vessels
+    v, m, safety = w.vessels, w.obstacles, w.safety
     V = v.active.shape[0]
-    S = w.safety.distance.shape[1]
-    seconds = (w.tick - w.frame_tick) * w.dt
     for o in range(w.observer.shape[0]):
         j = w.observer[o]
         if v.active[j] == 0:
             continue
-        for s in range(S):
-            active = v.active[s] if s < V else w.obstacles.active[s - V]
-            if active == 0 or s == j:
+        n1, e1, p1 = v.frame_eta[j, 0], v.frame_eta[j, 1], v.frame_eta[j, 2]
+        dn1, de1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1
+        l1, b1 = v.length[j], v.beam[j]
+        s1, c1 = sincos(v.eta[j, 2])
+        reach1 = 0.5 * math.sqrt(l1 * l1 + b1 * b1)
+        for s in range(safety.distance.shape[1]):
+            disc = s >= V
+            i = s - V
+            if (m.active[i] if disc else v.active[s]) == 0 or s == j:
                 continue
-            near, end = _closest_in_frame(w, o, j, s, seconds)
-            w.safety.distance[o, s] = end
-            w.safety.closest[o, s] = min(w.safety.closest[o, s], near)
-            w.safety.step_closest[o] = min(w.safety.step_closest[o], near)
-            if near <= 0.0 and w.safety.collided_with[o] < 0:
-                w.safety.collided_with[o] = s
+            if disc:
+                n2, e2, p2 = m.frame_position[i, 0], m.frame_position[i, 1], 0.0
+                dn2, de2, dp2 = m.position[i, 0] - n2, m.position[i, 1] - e2, 0.0
+                l2 = b2 = 2.0 * m.radius[i]
+                reach2 = m.radius[i]
+            else:
+                n2, e2, p2 = v.frame_eta[s, 0], v.frame_eta[s, 1], v.frame_eta[s, 2]
+                dn2, de2, dp2 = v.eta[s, 0] - n2, v.eta[s, 1] - e2, v.eta[s, 2] - p2
+                l2, b2 = v.length[s], v.beam[s]
+                reach2 = 0.5 * math.sqrt(l2 * l2 + b2 * b2)
+            rn, re = n1 - n2, e1 - e2
+            vn, ve = dn1 - dn2, de1 - de2
+            travelled2 = vn * vn + ve * ve
+            t = min(max(-(rn * vn + re * ve) / travelled2, 0.0), 1.0) if travelled2 > 0.0 else 1.0
+            limit = reach1 + reach2 + CLOSE
+            if (rn + t * vn) ** 2 + (re + t * ve) ** 2 > limit * limit:
+                s2, c2 = (0.0, 1.0) if disc else sincos(p2 + dp2)
+                end = far_distance(rn + vn, re + ve, s1, c1, l1, b1, s2, c2, l2, b2)
+                near = end
+                if 0.0 < t < 1.0:  # passing: the nearest point lies within the frame
+                    near = min(near, far_distance(rn + t * vn, re + t * ve, s1, c1, l1, b1, s2, c2, l2, b2))
+            else:
+                near, end = _follow(w, j, s, disc, l2, b2, n2, e2, p2, dn2, de2, dp2)
+            safety.distance[o, s] = end
+            safety.closest[o, s] = min(safety.closest[o, s], near)
+            safety.step_closest[o] = min(safety.step_closest[o], near)
+            if near <= 0.0 and safety.collided_with[o] < 0:
+                safety.collided_with[o] = s

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterator
+import functools
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from ..resources import shipped
+from ..config import ConfigError, Model, locate, read_yaml, validate
 from ..units import DEG
 from .state import A
 
@@ -20,11 +18,7 @@ NonNegative = Annotated[float, Field(ge=0)]
 Preset = Literal["standard", "original"]
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Mass(_Model):
+class Mass(Model):
     """Rigid body about the origin of {b}, and added mass (positive, as it adds up)."""
 
     mass_kg: Positive
@@ -53,7 +47,7 @@ class Mass(_Model):
         ])
 
 
-class Coriolis(_Model):
+class Coriolis(Model):
     """Coriolis and centripetal forces.
 
     ``full``: from the mass matrix with added mass, Munk moment included.  ``rigid_body``: of the hull alone.
@@ -64,7 +58,7 @@ class Coriolis(_Model):
     sway_kg: float = 0.0
 
 
-class Damping(_Model):
+class Damping(Model):
     """Hydrodynamic derivatives in SI units: force = derivative * motion, so drag is negative."""
 
     Xu: float = 0.0
@@ -87,7 +81,7 @@ class Damping(_Model):
     Nrrr: float = 0.0
 
 
-class Crossflow(_Model):
+class Crossflow(Model):
     """Cross-flow drag of the strips from ``from_x_m`` to ``to_x_m``."""
 
     drag_coefficient: NonNegative
@@ -98,7 +92,7 @@ class Crossflow(_Model):
     yaw_factor: NonNegative = 1.0
 
 
-class Wind(_Model):
+class Wind(Model):
     """Wind load in Blendermann's form."""
 
     frontal_area_m2: NonNegative
@@ -110,7 +104,7 @@ class Wind(_Model):
     cross_force: NonNegative
 
 
-class Waves(_Model):
+class Waves(Model):
     """Gain of the wave-force filter per metre of significant height."""
 
     surge_N_per_m: NonNegative
@@ -118,14 +112,14 @@ class Waves(_Model):
     yaw_Nm_per_m: NonNegative
 
 
-class Transfer(_Model):
+class Transfer(Model):
     """Denominator without its leading 1, and numerator, highest power first."""
 
     denominator: tuple[float, ...] = Field(min_length=2, max_length=4)
     numerator: tuple[float, ...] = Field(min_length=2, max_length=4)
 
 
-class FluidMemory(_Model):
+class FluidMemory(Model):
     """Radiation forces as transfer functions of velocity through the water."""
 
     force_scale: float
@@ -135,7 +129,7 @@ class FluidMemory(_Model):
     coupling: Transfer
 
 
-class Thruster(_Model):
+class Thruster(Model):
     """A propeller, bow thruster or waterjet; mixing gives its share of the demands (surge, yaw)."""
 
     name: str
@@ -157,7 +151,7 @@ class Thruster(_Model):
     mix_nozzle: float = 0.0
 
 
-class Autopilot(_Model):
+class Autopilot(Model):
     """Gains of ``world/autopilot.py``."""
 
     heading_gain: Positive
@@ -169,7 +163,7 @@ class Autopilot(_Model):
     speed_curve_exponent: Positive
 
 
-class VesselModel(_Model):
+class VesselModel(Model):
     """A vessel file.  Lengths in metres, speeds in metres per second, body axes forward and starboard."""
 
     name: str
@@ -207,56 +201,17 @@ def load_vessel(name_or_path: str | Path) -> VesselModel:
 
     Raises
     ------
-    ValueError
-        (``ConfigError``) in one line: the file, the key path, what was expected and the nearest known name.
+    ConfigError
+        one line per problem: the file, the key path, what was expected and the nearest known name.
     """
-    known = shipped("vessels")
-    path = known.get(str(name_or_path), Path(name_or_path))
-    if not path.is_file():
-        raise _error(f"vessel {str(name_or_path)!r}: not a file and not one of {', '.join(known)}"
-                     + _suggest(str(name_or_path), list(known)))  # fmt: skip
-    try:
-        return VesselModel.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except yaml.YAMLError as e:
-        raise _error(f"{path}: not valid YAML: {' '.join(str(e).split())}") from None
-    except ValidationError as e:
-        raise _error("; ".join(f"{path}: {line}" for line in _lines(e))) from None
+    path = locate("vessels", str(name_or_path))
+    return _load(path, path.stat().st_mtime_ns)
 
 
-def _lines(error: ValidationError) -> Iterator[str]:
-    for item in error.errors():
-        key = ".".join(str(part) for part in item["loc"]) or "(file)"
-        hint = ""
-        if item["type"] == "extra_forbidden":
-            hint = _suggest(str(item["loc"][-1]), _fields(item["loc"][:-1]))
-        given = item["input"]
-        shown = f", got {given!r}" if isinstance(given, str | int | float | bool) else ""
-        yield f"{key}: {item['msg']}{shown}{hint}"
-
-
-def _fields(path: tuple[int | str, ...]) -> list[str]:
-    """Names that are allowed at a key path of a vessel file."""
-    model: Any = VesselModel
-    for part in path:
-        if isinstance(part, int):
-            continue
-        annotation = model.model_fields[part].annotation
-        inner = [t for t in getattr(annotation, "__args__", ()) if hasattr(t, "model_fields")]
-        model = inner[0] if inner else annotation
-    return list(model.model_fields)
-
-
-def _suggest(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
-
-
-def _error(message: str) -> ValueError:
-    try:
-        from ..config import ConfigError
-    except ImportError:
-        return ValueError(message)
-    return ConfigError(message)
+@functools.lru_cache(maxsize=32)
+def _load(path: Path, modified: int) -> VesselModel:
+    """Read a vessel file once for as long as it does not change."""
+    return validate(VesselModel, read_yaml(path))
 
 
 def write_plant(
@@ -275,12 +230,12 @@ def write_plant(
     memory on.
     """
     if memory and model.fluid_memory is None:
-        raise _error(f"vessel {model.name}: has no fluid_memory")
+        raise ConfigError(f"vessel {model.name}: has no fluid_memory")
     original = preset == "original"
     q = worlds["plants"][b]
     for field in q.dtype.names:
         q[field][p] = 0
-    values: dict[str, Any] = dict(model.damping)
+    values: dict[str, Any] = model.damping.model_dump()
     m = model.mass.matrix()
     values |= {"m11": m[0, 0], "m22": m[1, 1], "m23": m[1, 2], "m32": m[2, 1], "m33": m[2, 2]}
     values |= {"coriolis": model.coriolis_masses(), "coriolis_linearised": model.coriolis.form == "linearised"}

@@ -1,0 +1,241 @@
+"""The Gymnasium vector face: B worlds in one process, one kernel call per step."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils.seeding import np_random
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from ..config import Document, validate
+from ..scenarios.commands import Commands
+from ..scenarios.loader import Source
+from ..tasks.task import TaskConfig, unflatten
+from .core import Core, check_difficulty, check_weather, masked
+from .notice import compiling
+from .single import USVEnv
+
+Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+
+
+class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
+    """``num_envs`` worlds of one task; the numbers are those of ``SyncVectorEnv`` over single environments, bit for bit.
+
+    ``gym.make_vec("usv_gym/OpenSea-v0", 64)`` makes one.  Each row has its own random generator, seeded ``seed + row`` or
+    from a list, and its own episode, which ends where that of the single environment does.
+
+    Parameters
+    ----------
+    num_envs
+        B, the number of worlds.
+    autoreset_mode
+        what happens when an episode ends: its row is reset by the next ``step`` (``NEXT_STEP``), by the same one
+        (``SAME_STEP``: the last observation and info are in ``infos["final_obs"]`` and ``infos["final_info"]``), or by the
+        caller with ``reset(options={"reset_mask": mask})`` (``DISABLED``).
+    num_threads
+        threads that share the rows; 1 is serial.  Worth it from about 64 rows; changes no bit.
+    max_episode_steps
+        ends episodes sooner than the scenario's duration does.
+    scenario, vessel, difficulty, weather, overrides, reward, render_mode, **task
+        as for the single environment, :class:`~usv_gym.envs.single.USVEnv`.
+
+    ``reset(options=...)`` takes ``reset_mask`` and the options of the single environment, for the rows that are reset; all
+    rows share scenario and vessel.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scenario: Source | None = None,
+        *,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        num_threads: int = 1,
+        max_episode_steps: int | None = None,
+        vessel: str | None = None,
+        difficulty: float = 0.5,
+        weather: str | Mapping[str, Any] | None = None,
+        overrides: Sequence[str] = (),
+        reward: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        **task: Any,
+    ) -> None:
+        if num_envs < 1:
+            raise ValueError(f"num_envs: expected a whole number of at least 1, got {num_envs!r}")
+        if render_mode is not None and render_mode not in USVEnv.metadata["render_modes"]:
+            raise ValueError(f"render_mode: expected one of {USVEnv.metadata['render_modes']}, got {render_mode!r}")
+        config = validate(TaskConfig, Document("environment arguments", {**task, "reward": dict(reward or {})}))
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**copy.deepcopy(USVEnv.metadata), "autoreset_mode": self.autoreset_mode}
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        with compiling():
+            self.core = Core(num_envs, source=scenario, config=config, vessel=vessel, overrides=overrides, weather=weather,
+                             difficulty=difficulty, max_steps=max_episode_steps, num_threads=num_threads)  # fmt: skip
+        self.single_action_space = self.core.action_space
+        self.single_observation_space = self.core.observation_space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.rows = tuple(Row(self, b) for b in range(num_envs))
+        self._generators: list[tuple[np.random.Generator, int] | None] = [None] * num_envs
+        self._all = np.ones(num_envs, np.bool_)
+        self._started = np.zeros(num_envs, np.bool_)
+        self._ended = np.zeros(num_envs, np.bool_)
+
+    # --- randomness --------------------------------------------------------------------------------------------------
+    def _generator(self, b: int) -> tuple[np.random.Generator, int]:
+        owned = self._generators[b]
+        if owned is None:
+            owned = self._generators[b] = np_random()
+        return owned
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The random generator of each row."""
+        return tuple(self._generator(b)[0] for b in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seed of the generator of each row."""
+        return tuple(self._generator(b)[1] for b in range(self.num_envs))
+
+    # --- running -----------------------------------------------------------------------------------------------------
+    def begin(self, mask: NDArray[np.bool_]) -> None:
+        """Start new episodes in the rows of ``mask`` [B]; what comes of it is in ``core``."""
+        generators = [self._generator(b)[0] if start else None for b, start in enumerate(mask.tolist())]
+        with compiling():
+            self.core.reset(mask, generators)
+        for b in np.flatnonzero(mask).tolist():
+            self.rows[b].forget()
+
+    def advance(self, actions: Any, mask: NDArray[np.bool_]) -> None:
+        """One control step of the rows of ``mask`` [B]; what comes of it is in ``core``.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            before the first reset of a row.
+        ValueError
+            if the actions have a wrong shape or one is not finite.
+        """
+        if not self._started.all():
+            raise gym.error.ResetNeeded("call reset() before step()")
+        try:
+            given = np.asarray(actions, np.float64)
+        except (ValueError, TypeError):
+            given = np.empty(0)
+        if given.shape != self.action_space.shape:
+            raise ValueError(f"actions {' '.join(repr(actions).split())[:200]} do not fit {self.action_space}")
+        self.core.actions[:] = given.reshape(self.core.actions.shape)
+        self.core.step(mask)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,  # type: ignore[override]
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start new episodes, in all rows or in those of ``options["reset_mask"]``.
+
+        Raises
+        ------
+        ConfigError
+            for options that no row can take; see :meth:`Core.configure`.
+        """
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds: Sequence[int | None] = [None if seed is None else int(seed) + b for b in range(self.num_envs)]
+        else:
+            seeds = seed
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed: expected {self.num_envs} seeds, one for each environment, got {len(seeds)}")
+        others = dict(options or {})
+        mask = self._all if "reset_mask" not in others else self._checked(others.pop("reset_mask"))
+        self.core.configure(others, mask)
+        for b in np.flatnonzero(mask).tolist():
+            if seeds[b] is not None:
+                self._generators[b] = np_random(seeds[b])
+        self.begin(mask)
+        self._started[mask] = True
+        self._ended = self._ended & ~mask
+        return self.observation(), self._reset_infos(self.core.infos(mask), mask)
+
+    def step(self, actions: Any) -> Step:
+        """Advance all rows by one control interval; see ``autoreset_mode`` for those whose episode has ended."""
+        core, ended = self.core, self._ended
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
+            self.advance(actions, ~ended)
+            if ended.any():
+                self.begin(ended)
+        elif self.autoreset_mode is AutoresetMode.DISABLED:
+            if ended.any():
+                raise gym.error.ResetNeeded(
+                    f"the episodes of rows {np.flatnonzero(ended).tolist()} have ended: reset them with "
+                    "reset(options={'reset_mask': mask})"
+                )
+            self.advance(actions, self._all)
+        else:
+            self.advance(actions, self._all)
+        reward, terminated, truncated = core.reward.copy(), core.terminated.copy(), core.truncated.copy()
+        over = terminated | truncated
+        infos: dict[str, Any] = {}
+        restarted = ended
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            restarted = over
+            if over.any():
+                last = np.full(self.num_envs, None, object)
+                for b in np.flatnonzero(over).tolist():
+                    last[b] = self.observation(b)
+                infos = masked({"final_obs": last, "final_info": core.infos(over)}, over)
+                self.begin(over)
+        self._ended = over
+        infos.update(core.infos(self._all.copy()))
+        return self.observation(), reward, terminated, truncated, self._reset_infos(infos, restarted)
+
+    def observation(self, rows: int | slice = slice(None)) -> Any:
+        """A copy of the observations as they are now, batched, or of one row."""
+        flat = self.core.obs[rows]
+        return flat.copy() if self.core.config.flat else unflatten(self.core.config, flat)
+
+    def _checked(self, mask: Any) -> NDArray[np.bool_]:
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(f"options['reset_mask']: expected a bool array of shape ({self.num_envs},) with at least one "
+                             f"True, got {mask!r}")  # fmt: skip
+        return mask.copy()
+
+    def _reset_infos(self, infos: dict[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
+        """Add what only a reset tells, the scales, for the rows of ``mask`` [B]."""
+        if mask.any():
+            scales = {key: np.where(mask, value, np.zeros((), type(value))) for key, value in self.core.scales().items()}
+            infos.update(masked({"scales": masked(scales, mask)}, mask))
+        return infos
+
+    # --- rows --------------------------------------------------------------------------------------------------------
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Of every row: what its method returns, or its attribute; see :class:`Row`."""
+        found = [getattr(row, name) for row in self.rows]
+        return tuple(value(*args, **kwargs) if callable(value) else value for value in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of every row; see :class:`Row`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of every row, from a list of one value for each, or one for all; see :class:`Row`."""
+        each = list(values) if isinstance(values, list | tuple) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise ValueError(f"set_attr({name!r}): expected {self.num_envs} values, got {len(each)}")
+        for row, value in zip(self.rows, each, strict=True):
+            row.set_wrapper_attr(name, value)
+
+    def render(self) -> tuple[Any, ...] | None:
+        """The map of every row as [H, W, 3]; None without a render mode."""
+        return None if self.render_mode is None else tuple(row.render() for row in self.rows)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Let the threads go."""
+        self.core.crew.close()
