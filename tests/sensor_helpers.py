@@ -20,8 +20,10 @@ NO_NOISE = {"sensors": {}}  #: keys of a sea with the ranges and rates of the th
 def sea(B=1, *, first_seed=1, own_velocity=None, **keys: Any):
     """B worlds of one calm scenario that differ in their seeds only; the own ship rests unless the keys say otherwise.
 
-    ``own_velocity`` (speed [m/s], heading [rad]) makes the own ship sail straight on, kinematically.
+    ``own_velocity`` (speed [m/s], heading [rad]) makes the own ship sail straight on, kinematically, tick by tick.
     """
+    if own_velocity is not None:
+        keys = {"simulation": {"traffic_interval": 0.05}} | keys
     worlds, names = build_worlds(load_scenario(keys), B, capacity=(V, 16))
     worlds["seed"] = np.arange(first_seed, first_seed + B)
     if own_velocity is not None:

@@ -20,7 +20,12 @@ TICK = 0.05
 
 def ship(north=500.0, east=0.0, **more):
     """A class A ship at 10 kn on its way north for ever."""
-    return {"length": 60, "speed_kn": 10, "after_last": "continue", "waypoints": [[north, east], [north + 500, east]]} | more
+    return {
+        "length": 60,
+        "speed_kn": 10,
+        "after_last": "continue",
+        "waypoints": [[north, east], [north + 500, east]],
+    } | more
 
 
 def only_ais(**keys):

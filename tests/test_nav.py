@@ -12,7 +12,13 @@ from usv_gym.scenarios.loader import SensorRateWarning, load_scenario
 from usv_gym.units import DEG
 
 #: one field of each sensor, with the key of the sensor
-FIELDS = {"gnss": "position", "mru": "mru_heading", "imu": "specific_force", "speed_log": "water_speed", "wind": "wind_speed"}
+FIELDS = {
+    "gnss": "position",
+    "mru": "mru_heading",
+    "imu": "specific_force",
+    "speed_log": "water_speed",
+    "wind": "wind_angle",
+}
 NOISY = {
     "gnss": {"position_std": 1.0, "heading_std_deg": 0.2, "course_std_deg": 0.5, "speed_std": 0.1},
     "mru": {"heading_std_deg": 0.3, "yaw_rate_std_deg_s": 0.4},

@@ -6,6 +6,8 @@ the next frame's decisions; then the sensors that are due.  What a sensor sees i
 
 from __future__ import annotations
 
+import math
+
 from .jit import kernel, spliced
 from .sensors.nav import navigate
 from .sensors.schedule import first_events, sense
@@ -76,7 +78,7 @@ def reset_world(w):
     steer(w, w.frame_ticks * w.dt)
     sweep(w)
     for o in range(w.observer.shape[0]):
-        w.safety.step_closest[o] = 1.0e9
+        w.safety.step_closest[o] = math.inf
     navigate(w, w.tick)
     first_events(w)
 

@@ -2,7 +2,8 @@
 
 Every random number is a pure function of (world seed, stream, slot, tick).  Nothing is carried along, so a sensor that
 does not fire draws nothing, a controller that acts differently moves nobody's noise, and row i of any batch equals the
-same world alone.  The mixing function is the finaliser of SplitMix64 (Steele, Lea and Flood 2014), applied per word.
+same world alone.  The generator is SplitMix64 (Steele, Lea and Flood 2014) read at any place: the counter's place in the stream
+of the world's seed.
 
 ``numpy.random.Generator`` is used at reset only, to draw ``seed`` and the scenario.
 """
@@ -30,7 +31,9 @@ _M1 = np.uint64(0xBF58476D1CE4E5B9)
 _M2 = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _SLOT_BITS, _STREAM_BITS = np.uint64(32), np.uint64(52)
+_S32, _LOW = np.uint64(32), np.uint64(0xFFFFFFFF)
 _TO_UNIT = 1.0 / 9007199254740992.0  # 2^-53
+_TO_UNIT32 = 1.0 / 4294967296.0
 
 
 @inner
@@ -42,9 +45,9 @@ def _mix(z):
 
 @inner
 def bits(seed, stream, slot, tick):
-    """64 random bits of a counter; slot < 2^20, tick < 2^32."""
+    """64 random bits of a counter: number ``word`` of the SplitMix64 stream ``seed``; slot < 2^20, tick < 2^32."""
     word = (np.uint64(stream) << _STREAM_BITS) | (np.uint64(slot) << _SLOT_BITS) | np.uint64(tick)
-    return _mix(_mix(np.uint64(seed) + _GOLDEN) ^ (word * _GOLDEN))
+    return _mix(np.uint64(seed) + word * _GOLDEN)
 
 
 @inner
@@ -56,10 +59,10 @@ def uniform(seed, stream, slot, tick):
 @inner
 def normal2(seed, stream, slot, tick):
     """Two independent standard normal numbers (Box and Muller 1958)."""
-    first = bits(seed, stream, slot, tick)
-    second = _mix(first + _GOLDEN)
-    u = (np.float64(np.int64(first >> _S11)) + 0.5) * _TO_UNIT
-    v = np.float64(np.int64(second >> _S11)) * _TO_UNIT
+    word = bits(seed, stream, slot, tick)
+    # half of the bits each: normal numbers up to 6.7 standard deviations
+    u = (np.float64(np.int64(word >> _S32)) + 0.5) * _TO_UNIT32
+    v = np.float64(np.int64(word & _LOW)) * _TO_UNIT32
     radius = math.sqrt(-2.0 * math.log(u))
     s, c = sincos_random(2.0 * math.pi * v)
     return radius * c, radius * s

@@ -46,6 +46,8 @@ class Mission:
     rows: NDArray[np.float64] | None = None
     #: (tick, command, arguments) to give on the way; see ``Commands``
     orders: Sequence[tuple[int, str, dict[str, Any]]] = ()
+    #: a policy file may execute code when it is read
+    trust: bool = False
 
 
 def plan(
@@ -56,6 +58,7 @@ def plan(
     vessel: str | None = None,
     overrides: Sequence[str] = (),
     seed: int = 0,
+    trust: bool = False,
 ) -> Mission:
     """Read everything that a run needs, so that nothing can fail half-way.
 
@@ -71,8 +74,8 @@ def plan(
     if name != THRUST_LOG:
         if thrust_log is not None:
             raise ConfigError(f"policy {name!r} does not read a thrust log; leave --thrust-log or --policy out")
-        make_policy(name)
-        return Mission(scenario, name, seed)
+        make_policy(name, trust=trust)
+        return Mission(scenario, name, seed, trust=trust)
     log = read_thrust_log(thrust_log if thrust_log is not None else shipped_log())
     rows = per_tick(commands(log, load_vessel(scenario.own_ship.vessel)), scenario.simulation.dt)
     return Mission(scenario, name, seed, rows)
@@ -88,8 +91,8 @@ def run(mission: Mission, progress: Progress | None = None) -> Episode:
     if rows is not None:
         config, controller = TaskConfig(end_on_collision=False, end_on_arrival=False, end_out_of_area=False), None
     else:
-        controller = make_policy(mission.policy)
-        config = _task_of(controller)
+        controller = make_policy(mission.policy, trust=mission.trust)
+        config = task_of(controller)
     # a log is recorded tick by tick
     tick = [f"simulation.control_interval={mission.scenario.simulation.dt!r}"] if rows is not None else []
     with ExitStack() as stack:
@@ -113,11 +116,11 @@ def run(mission: Mission, progress: Progress | None = None) -> Episode:
             observation = core.obs[0].copy() if config.flat else unflatten(config, core.obs[0])
             core.actions[0] = controller.act(observation)
             recorder.action(core.actions[0])
-            core.step(_ONE)
+            core.step()
         else:
             assert rows is not None
             recorder.action(rows[step])
-            core.step(_ONE, rows[step : step + 1])
+            core.step(rows=rows[step : step + 1])
         recorder.sample(core.worlds)
         for notice in orders.notices():
             recorder.event(notice.t, notice.kind, notice.source, notice.text or notice.id)
@@ -141,8 +144,11 @@ def run(mission: Mission, progress: Progress | None = None) -> Episode:
     )
 
 
-def _task_of(controller: Any) -> TaskConfig:
-    """The task that a controller asks for: its ``action``, ``observation`` and ``flat``, where it has them."""
+def task_of(controller: Any) -> TaskConfig:
+    """The task that a controller asks for: its ``task``, or its ``action``, ``observation`` and ``flat``."""
+    if isinstance(getattr(controller, "task", None), TaskConfig):
+        task: TaskConfig = controller.task
+        return task
     asked = {name: getattr(controller, name) for name in ("action", "observation", "flat") if hasattr(controller, name)}
     return validate(TaskConfig, Document(f"controller {type(controller).__name__}", asked))
 
@@ -168,10 +174,10 @@ def resimulate(episode: Episode) -> Episode:
         while waiting and waiting[0][0] <= int(core.worlds["tick"][0]):
             orders.apply(*waiting.pop(0)[1:])
         if driven:
-            core.step(_ONE, action[None])
+            core.step(rows=action[None])
         else:
             core.actions[0] = action
-            core.step(_ONE)
+            core.step()
         recorder.sample(core.worlds)
     return recorder.finish(
         names=orders.called, scenario=meta["scenario"], seed=meta["seed"], policy=meta["policy"], vessel=meta["vessel"]

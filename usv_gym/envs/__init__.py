@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import gymnasium as gym
 
-#: id -> entry point
+#: id -> entry points of one world and of a batch
 ENVIRONMENTS = {
-    "usv_gym/OpenSea-v0": "usv_gym.envs.single:OpenSeaEnv",
-    "usv_gym/Scenario-v0": "usv_gym.envs.single:ScenarioEnv",
+    "usv_gym/OpenSea-v0": ("usv_gym.envs.single:OpenSeaEnv", "usv_gym.envs.vector:OpenSeaVectorEnv"),
+    "usv_gym/Scenario-v0": ("usv_gym.envs.single:ScenarioEnv", "usv_gym.envs.vector:ScenarioVectorEnv"),
 }
 
 
@@ -16,6 +16,6 @@ def register_all() -> None:
 
     The environments check their own actions, order and episode length, so Gymnasium's per-step wrappers are left out.
     """
-    for name, entry_point in ENVIRONMENTS.items():
+    for name, (one, many) in ENVIRONMENTS.items():
         if name not in gym.registry:
-            gym.register(name, entry_point, order_enforce=False, disable_env_checker=True)
+            gym.register(name, one, vector_entry_point=many, order_enforce=False, disable_env_checker=True)

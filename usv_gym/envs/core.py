@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from ..config import ConfigError, Document, validate
 from ..scenarios.build import build_worlds, write_weather
+from ..scenarios.families import sample_open_sea
 from ..scenarios.loader import Source, load_scenario
 from ..scenarios.schema import Scenario, Weather
+from ..tasks.step import BEGIN, STEP, observe_batch, run_batch
 from ..tasks.task import (
     DISCRETE,
-    N_TERMS,
     OUTCOMES,
     TERMS,
     TaskConfig,
@@ -93,6 +94,7 @@ class Core:
     """
 
     worlds: NDArray[Any]
+    task: NDArray[Any]
     action_space: gym.Space[Any]
     names: list[str]
     scenario: Scenario
@@ -120,14 +122,23 @@ class Core:
         self.crew = Crew(num_threads)
         self._load(source, vessel)
         self.observation_space = observation_space(config)
-        self.obs = np.zeros((num, observation_size(config)), np.float32)
-        self.terms = np.zeros((num, N_TERMS))
-        self.reward = np.zeros(num)
-        self.terminated = np.zeros(num, np.bool_)
-        self.truncated = np.zeros(num, np.bool_)
-        self.actions = np.zeros((num, 1 if self.config.action == "discrete" else self.action_space.shape[0]))  # type: ignore[index]
-        self.episodes = np.zeros(num, episode_dtype())
-        self._what = np.zeros(num, np.int8)
+        # one observer per world; the kernel knows of more
+        self._obs = np.zeros((num, 1, observation_size(config)), np.float32)
+        self._episodes = np.zeros((num, 1), episode_dtype())
+        self._name_views()
+
+    def _name_views(self) -> None:
+        self.obs, self.episodes = self._obs[:, 0], self._episodes[:, 0]
+        self.actions = self.episodes["action"][:, : int(self.task["channels"][0])]
+        self.terms, self.reward = self.episodes["terms"], self.episodes["reward"]
+        self.terminated, self.truncated = self.episodes["terminated"], self.episodes["truncated"]
+        self._what, self._outcome = self.episodes["what"], self.episodes["outcome"]
+        self._closest, self._to_go = self.episodes["closest"], self.episodes["to_go"]
+        self._tick = self.worlds["tick"]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._name_views()  # pickle makes arrays of their own of them
 
     # --- set-up ------------------------------------------------------------------------------------------------------
     def _load(self, source: Source | None, vessel: str | None) -> None:
@@ -149,6 +160,7 @@ class Core:
         # nothing is changed until all of it is known to be right
         self.source, self.vessel, self.scenario, self.model = source, vessel, scenario, model
         self.worlds, self.names, self.action_space = worlds, names, space
+        self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation
         self.control_interval = simulation.control_ticks * simulation.dt
         max_steps = int(np.ceil(simulation.duration / self.control_interval - 1e-9))
@@ -202,8 +214,6 @@ class Core:
     # --- running -----------------------------------------------------------------------------------------------------
     def reset(self, mask: NDArray[np.bool_], generators: Sequence[np.random.Generator]) -> None:
         """Draw and start new episodes in the rows of ``mask`` [B]; generators [B] own the randomness."""
-        from ..scenarios.families import sample_open_sea
-
         rows = self._bytes
         for b in np.flatnonzero(mask).tolist():
             rows[b] = self._template
@@ -211,7 +221,7 @@ class Core:
             self._set_weather(b, generators[b])
         if self.source is None:
             sample_open_sea(self.worlds, mask, self.difficulty, self.model.cruise_speed)
-        self._what[:] = mask  # BEGIN is 1
+        self._what[:] = np.where(mask, BEGIN, 0)
         self._run(NO_ROWS)
 
     def _set_weather(self, b: int, generator: np.random.Generator) -> None:
@@ -237,16 +247,15 @@ class Core:
                         current_speed=0.6 * d * current, current_to=2 * np.pi * drift,
                         wave_height=1.5 * d * height, wave_to=2 * np.pi * way, original=original)  # fmt: skip
 
-    def step(self, mask: NDArray[np.bool_], rows: NDArray[np.float64] = NO_ROWS) -> None:
-        """One control step of the rows of ``mask`` with ``self.actions``; results are in obs, reward, terms, ...
+    def step(self, mask: NDArray[np.bool_] | None = None, rows: NDArray[np.float64] = NO_ROWS) -> None:
+        """One control step of the rows of ``mask`` [B] (all) with ``self.actions``; results are in obs, reward, terms, ...
 
         Raises
         ------
         ValueError
             if an action is not finite, or none of ``discrete``; nothing has moved then.
         """
-        self._what[:] = mask
-        self._what *= 2  # STEP
+        self._what[:] = STEP if mask is None else np.where(mask, STEP, 0)
         bad = self._run(rows)
         if bad >= 0:
             expected = "a whole number from 0 to 4" if self.config.action == "discrete" else "finite numbers"
@@ -254,18 +263,11 @@ class Core:
             raise ValueError(f"action {self.actions[bad].tolist()}{row}: expected {expected}")
 
     def _run(self, rows: NDArray[np.float64]) -> int:
-        batch = (self.worlds, self.episodes, self._what, self.actions, self.obs, self.terms, self.reward, self.terminated,
-                 self.truncated)  # fmt: skip
         if self.crew.size == 1 or np.count_nonzero(self._what) < _WORTH_SHARING or not self._plausible():
-            return self._kernel(rows, *batch)
-        self.crew.share(self.num, lambda part: self._kernel(rows, *(array[part] for array in batch)))
+            return int(run_batch(self.worlds, self.task, self._episodes, self._obs, rows))
+        self.crew.share(self.num, lambda part: run_batch(self.worlds[part], self.task, self._episodes[part],
+                                                         self._obs[part], rows))  # fmt: skip
         return -1
-
-    def _kernel(self, rows: Any, worlds: Any, episodes: Any, what: Any, actions: Any, *results: Any) -> int:
-        from ..tasks.step import run_batch
-
-        bad: int = run_batch(worlds, self.task, episodes, what, actions, rows, *results)
-        return bad
 
     def _plausible(self) -> bool:
         """Whether all actions can be carried out; if not, one call has to find the bad row before any row moves."""
@@ -274,9 +276,7 @@ class Core:
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""
-        from ..tasks.step import observe_batch
-
-        observe_batch(self.worlds, self.task, self.obs)
+        observe_batch(self.worlds, self.task, self._obs)
         return self.obs
 
     def scales(self) -> dict[str, float]:
@@ -295,13 +295,12 @@ class Core:
 
     def info(self, b: int) -> dict[str, Any]:
         """The info dict of row b after a step."""
-        episode = self.episodes[b]
-        outcome = OUTCOMES[episode["outcome"]]
+        outcome = OUTCOMES[self._outcome.item(b)]
         return {
             "reward_terms": dict(zip(TERMS, self.terms[b].tolist(), strict=True)),
-            "time": float(self.worlds["tick"][b] * self.worlds["dt"][b]),
-            "closest": float(episode["closest"]),
-            "to_go": float(episode["to_go"]),
+            "time": self._tick.item(b) * self._dt,
+            "closest": self._closest.item(b),
+            "to_go": self._to_go.item(b),
             "outcome": outcome,
             "is_success": outcome == "arrival",
         }

@@ -85,7 +85,7 @@ class USVEnv(gym.Env[Any, Any]):
     v0: first version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
 
     def __init__(
         self,
@@ -106,6 +106,10 @@ class USVEnv(gym.Env[Any, Any]):
         config = validate(TaskConfig, Document("environment arguments", {**task, "reward": dict(reward or {})}))
         self.metadata = copy.deepcopy(self.metadata)  # one's own: Gymnasium's wrappers write into it
         self.render_mode = render_mode
+        if render_mode == "human":
+            from ..render.canvas import load_pygame
+
+            load_pygame()  # better missing now than at the first reset
         with compiling():
             self.core = Core(1, source=scenario, config=config, vessel=vessel, overrides=overrides, difficulty=difficulty,
                              weather=weather)  # fmt: skip
@@ -115,6 +119,7 @@ class USVEnv(gym.Env[Any, Any]):
         self._started = False
         self._commands: Commands | None = None
         self._history: Any = None
+        self._window: Any = None
 
     def _observation(self) -> Any:
         flat = self.core.obs[0]
@@ -128,6 +133,8 @@ class USVEnv(gym.Env[Any, Any]):
             self.core.reset(_ONE, [self.np_random])
         self._commands = self._history = None
         self._started = True
+        if self.render_mode == "human":
+            self.render()
         return self._observation(), {**self.core.info(0), "scales": self.core.scales()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -144,29 +151,52 @@ class USVEnv(gym.Env[Any, Any]):
             raise gym.error.ResetNeeded("call reset() before step()")
         core = self.core
         try:
-            fits = np.shape(action) == self._action_shape
+            fits = getattr(action, "shape", None) == self._action_shape or np.shape(action) == self._action_shape
             if fits:
                 core.actions[0] = action
         except (ValueError, TypeError):
             fits = False
         if not fits:
             raise ValueError(f"action {' '.join(repr(action).split())} does not fit {self.action_space}")
-        core.step(_ONE)
-        return (self._observation(), float(core.reward[0]), bool(core.terminated[0]), bool(core.truncated[0]),
-                core.info(0))  # fmt: skip
+        core.step()
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), core.reward.item(0), core.terminated.item(0), core.truncated.item(0), core.info(0)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The map as [H, W, 3] for ``rgb_array``; None without a render mode."""
+        """The map as [H, W, 3] for ``rgb_array``; None without a render mode.
+
+        With ``human`` it is shown in a window, which ``reset`` and ``step`` do by themselves, at ``metadata["render_fps"]``;
+        the user may close the window, and the environment goes on without.
+        """
         if self.render_mode is None:
             warnings.warn("render() needs a render_mode; pass render_mode='rgb_array' to gym.make", stacklevel=2)
             return None
-        from ..render.pygame_view import render
         from ..render.scene import History, scene_from_snapshot
 
+        if self._window is False:
+            return None
         if self._history is None:
             self._history = History()
         names = self._commands.names if self._commands else self.core.ids(0)
-        return render(scene_from_snapshot(self.core.worlds[0], names, self._history), size=(800, 800))
+        scene = scene_from_snapshot(self.core.worlds[0], names, self._history)
+        if self.render_mode == "rgb_array":
+            from ..render.pygame_view import render
+
+            return render(scene, size=(800, 800))
+        from ..render.window import Window
+
+        if self._window is None:
+            self._window = Window(size=(1180, 800))
+        if not self._window.show(scene, float(self.metadata["render_fps"])):
+            self.close()
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window:
+            self._window.close()
+            self._window = False
 
     @property
     def commands(self) -> Commands:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,6 +21,98 @@ from .notice import compiling
 from .single import USVEnv
 
 Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+
+
+class Row:
+    """One world of a vector environment: what :meth:`USVVectorEnv.get_attr`, ``set_attr`` and ``call`` reach.
+
+    ``difficulty`` and ``weather`` can be set; the next reset of the row draws from them.
+    """
+
+    def __init__(self, env: USVVectorEnv, b: int) -> None:
+        self._env, self._b = env, b
+        self.action_space, self.observation_space = env.single_action_space, env.single_observation_space
+        self.render_mode, self.metadata = env.render_mode, env.metadata
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop what belongs to the episode that is over."""
+        self._commands: Commands | None = None
+        self._history: Any = None
+
+    @property
+    def spec(self) -> Any:
+        """The ``EnvSpec`` of the vector environment."""
+        return self._env.spec
+
+    @property
+    def world(self) -> Any:
+        """The record of the world (a view; see world/state.py)."""
+        return self._env.core.worlds[self._b]
+
+    @property
+    def commands(self) -> Commands:
+        """Commands to the running world; see :attr:`USVEnv.commands`."""
+        if self._commands is None:
+            core = self._env.core
+            self._commands = Commands(core.worlds, self._b, core.ids(self._b), core.scenario)
+        return self._commands
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """The generator of the row."""
+        return self._env.generators[self._b]
+
+    @property
+    def np_random_seed(self) -> int:
+        """The seed of the generator of the row."""
+        return self._env.seeds[self._b]
+
+    @property
+    def difficulty(self) -> float:
+        """Of the next episode, 0 to 1."""
+        return float(self._env.core.difficulty[self._b])
+
+    @difficulty.setter
+    def difficulty(self, value: float) -> None:
+        self._env.core.difficulty[self._b] = check_difficulty(value)
+
+    @property
+    def weather(self) -> Any:
+        """Of the next episode: a name, a mapping, or None for the scenario's own."""
+        return self._env.core.weather[self._b]
+
+    @weather.setter
+    def weather(self, value: Any) -> None:
+        self._env.core.weather[self._b] = check_weather(value)
+
+    def set(self, name: str, value: Any) -> None:
+        """Set ``difficulty`` or ``weather``.
+
+        Raises
+        ------
+        AttributeError
+            for any other name: setting it would do nothing.
+        """
+        if name not in ("difficulty", "weather"):
+            raise AttributeError(f"a row has no attribute {name!r} to set; difficulty and weather can be set")
+        setattr(self, name, value)
+
+    def info(self) -> dict[str, Any]:
+        """The info dict of the row as it is now."""
+        return self._env.core.info(self._b)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The map as [H, W, 3]; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        from ..render.pygame_view import render
+        from ..render.scene import History, scene_from_snapshot
+
+        if self._history is None:
+            self._history = History()
+        names = self._commands.names if self._commands else self._env.core.ids(self._b)
+        return render(scene_from_snapshot(self.world, names, self._history), size=(800, 800))
 
 
 class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
@@ -67,11 +158,11 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
     ) -> None:
         if num_envs < 1:
             raise ValueError(f"num_envs: expected a whole number of at least 1, got {num_envs!r}")
-        if render_mode is not None and render_mode not in USVEnv.metadata["render_modes"]:
-            raise ValueError(f"render_mode: expected one of {USVEnv.metadata['render_modes']}, got {render_mode!r}")
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode: expected 'rgb_array', got {render_mode!r}")
         config = validate(TaskConfig, Document("environment arguments", {**task, "reward": dict(reward or {})}))
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**copy.deepcopy(USVEnv.metadata), "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**USVEnv.metadata, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
         self.num_envs = num_envs
         self.render_mode = render_mode
         with compiling():
@@ -82,34 +173,27 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.rows = tuple(Row(self, b) for b in range(num_envs))
-        self._generators: list[tuple[np.random.Generator, int] | None] = [None] * num_envs
+        owned = [np_random() for _ in range(num_envs)]
+        self.generators, self.seeds = [generator for generator, _ in owned], [seed for _, seed in owned]
         self._all = np.ones(num_envs, np.bool_)
         self._started = np.zeros(num_envs, np.bool_)
         self._ended = np.zeros(num_envs, np.bool_)
 
-    # --- randomness --------------------------------------------------------------------------------------------------
-    def _generator(self, b: int) -> tuple[np.random.Generator, int]:
-        owned = self._generators[b]
-        if owned is None:
-            owned = self._generators[b] = np_random()
-        return owned
-
-    @property
+    @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The random generator of each row."""
-        return tuple(self._generator(b)[0] for b in range(self.num_envs))
+        return tuple(self.generators)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """The seed of the generator of each row."""
-        return tuple(self._generator(b)[1] for b in range(self.num_envs))
+        return tuple(self.seeds)
 
     # --- running -----------------------------------------------------------------------------------------------------
     def begin(self, mask: NDArray[np.bool_]) -> None:
         """Start new episodes in the rows of ``mask`` [B]; what comes of it is in ``core``."""
-        generators = [self._generator(b)[0] if start else None for b, start in enumerate(mask.tolist())]
         with compiling():
-            self.core.reset(mask, generators)
+            self.core.reset(mask, self.generators)
         for b in np.flatnonzero(mask).tolist():
             self.rows[b].forget()
 
@@ -126,18 +210,20 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         if not self._started.all():
             raise gym.error.ResetNeeded("call reset() before step()")
         try:
-            given = np.asarray(actions, np.float64)
+            given = np.asarray(actions)
+            fits = given.shape == self.action_space.shape
+            if fits:
+                self.core.actions[:] = given.reshape(self.core.actions.shape)
         except (ValueError, TypeError):
-            given = np.empty(0)
-        if given.shape != self.action_space.shape:
+            fits = False
+        if not fits:
             raise ValueError(f"actions {' '.join(repr(actions).split())[:200]} do not fit {self.action_space}")
-        self.core.actions[:] = given.reshape(self.core.actions.shape)
         self.core.step(mask)
 
     def reset(
         self,
         *,
-        seed: int | Sequence[int | None] | None = None,  # type: ignore[override]
+        seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
         """Start new episodes, in all rows or in those of ``options["reset_mask"]``.
@@ -154,11 +240,11 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed: expected {self.num_envs} seeds, one for each environment, got {len(seeds)}")
         others = dict(options or {})
-        mask = self._all if "reset_mask" not in others else self._checked(others.pop("reset_mask"))
+        mask = self._checked(others.pop("reset_mask")) if "reset_mask" in others else self._all.copy()
         self.core.configure(others, mask)
         for b in np.flatnonzero(mask).tolist():
             if seeds[b] is not None:
-                self._generators[b] = np_random(seeds[b])
+                self.generators[b], self.seeds[b] = np_random(seeds[b])
         self.begin(mask)
         self._started[mask] = True
         self._ended = self._ended & ~mask
@@ -230,7 +316,7 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         if len(each) != self.num_envs:
             raise ValueError(f"set_attr({name!r}): expected {self.num_envs} values, got {len(each)}")
         for row, value in zip(self.rows, each, strict=True):
-            row.set_wrapper_attr(name, value)
+            row.set(name, value)
 
     def render(self) -> tuple[Any, ...] | None:
         """The map of every row as [H, W, 3]; None without a render mode."""
@@ -239,3 +325,19 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
     def close_extras(self, **kwargs: Any) -> None:
         """Let the threads go."""
         self.core.crew.close()
+
+
+class OpenSeaVectorEnv(USVVectorEnv):
+    """``usv_gym/OpenSea-v0``, ``num_envs`` times: a new random open sea at every reset of a row."""
+
+    def __init__(self, num_envs: int = 1, **kwargs: Any) -> None:
+        if "scenario" in kwargs:
+            raise ValueError("OpenSea-v0 draws its own sea; use usv_gym/Scenario-v0 for scenario=")
+        super().__init__(num_envs, None, **kwargs)
+
+
+class ScenarioVectorEnv(USVVectorEnv):
+    """``usv_gym/Scenario-v0``, ``num_envs`` times: a scenario by name, path or mapping."""
+
+    def __init__(self, num_envs: int = 1, scenario: Source = "busy_open_sea", **kwargs: Any) -> None:
+        super().__init__(num_envs, scenario, **kwargs)

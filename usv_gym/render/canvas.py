@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
-from numpy.typing import NDArray
 
 from .palette import STYLES, Style
 from .primitives import Points
 
 RGBA = tuple[int, int, int, int]
+Frame = tuple[float, float, float, float]  # left, top, right, bottom [px]
 
 
 @functools.cache
@@ -69,36 +69,71 @@ def text_surface(text: str, size: int, colour: str, halo: str = "") -> Any:
     return out
 
 
+@functools.lru_cache(maxsize=4096)
 def text_size(text: str, size: int) -> tuple[int, int]:
     """Width and height of a text [px]."""
     width, height = font(size).size(text)
     return int(width), int(height)
 
 
+def fitting(text: str, room: float, size: int) -> str:
+    """Text, shortened when it would be wider than ``room`` [px]."""
+    if text_size(text, size)[0] <= room:
+        return text
+    while text and text_size(text + "…", size)[0] > room:
+        text = text[:-1]
+    return text + "…" if text else ""
+
+
+@functools.cache
+def look(role: str, palette: str) -> tuple[Style, RGBA | None, RGBA | None]:
+    """Style, area colour and line colour of a role."""
+    style = STYLES[role]
+    return style, rgba(style.fill(palette)), rgba(style.line(palette))
+
+
+@functools.cache
+def _unit_circle(n: int) -> Points:
+    b = np.linspace(0.0, 2.0 * math.pi, n, endpoint=False)
+    return np.column_stack((np.cos(b), np.sin(b)))
+
+
+@functools.lru_cache(maxsize=64)
+def _ring(radius: float, on: float, off: float) -> Points:
+    """Dashes [n, 4] x, y, x, y of a circle about (0, 0): rings about the own ship are the same in every frame."""
+    n = max(round(2.0 * math.pi * radius / (on + off)), 6)
+    a = np.arange(n) * (2.0 * math.pi / n)
+    b = a + 2.0 * math.pi / n * on / (on + off)
+    return radius * np.column_stack((np.cos(a), np.sin(a), np.cos(b), np.sin(b)))
+
+
 class Canvas:
-    """A picture in the making.  All coordinates are pixels of the result, x right, y down.
+    """A picture in the making.  Coordinates are px of 1/96 inch, which are pixels unless ``ratio`` says otherwise.
 
     Parameters
     ----------
-    size
-        width and height [px].
+    pixels
+        width and height of the result.
     palette
         name of a palette.
     supersample
         shapes are drawn this many times as large and averaged.
+    ratio
+        pixels per px: 2 on a screen of high density.
     """
 
-    def __init__(self, size: tuple[int, int], palette: str, supersample: int = 2) -> None:
+    def __init__(self, pixels: tuple[int, int], palette: str, supersample: int = 2, ratio: float = 1.0) -> None:
         """Blank picture."""
-        self.size, self.palette, self.ss = size, palette, supersample
+        self.pixels, self.ratio, self.palette, self.ss = pixels, ratio, palette, supersample * ratio
+        self.size = size = (pixels[0] / ratio, pixels[1] / ratio)  # [px]
+        self.frame = -20.0, -20.0, size[0] + 20.0, size[1] + 20.0  # what lies outside is out of sight
         self.pg = load_pygame()
-        self.surface = self.pg.Surface((size[0] * supersample, size[1] * supersample))
+        self.surface = self.pg.Surface((pixels[0] * supersample, pixels[1] * supersample))
         self._text: list[tuple[Any, tuple[int, int]]] = []
 
     def style(self, role: str) -> tuple[Style, RGBA | None, RGBA | None]:
         """Style, area colour and line colour of a role."""
-        style = STYLES[role]
-        return style, rgba(style.fill(self.palette)), rgba(style.line(self.palette))
+        return look(role, self.palette)
 
     # --- shapes ------------------------------------------------------------------------------------------------------
     def box(self, box: Sequence[float], role: str, radius: float = 0.0) -> None:
@@ -109,15 +144,18 @@ class Canvas:
     def polygon(self, points: Points, role: str) -> None:
         """Filled outline [n, 2]."""
         style, fill, line = self.style(role)
+        shape = clip(points, self.frame)  # its new edges lie out of sight
+        if len(shape) < 3:
+            return
         if fill is not None:
-            self._fill(points, fill)
+            self._fill(shape, fill)
         if line is not None:
-            self._stroke(np.vstack((points, points[:1])), line, style)
+            self._stroke(shape, line, style, closed=True)
 
     def polyline(self, points: Points, role: str, arrow: bool = False) -> None:
         """Line through points [n, 2]."""
         style, _, line = self.style(role)
-        if line is None or len(points) < 2:
+        if line is None or len(points) < 2 or _where(points, self.frame) == OUTSIDE:
             return
         if arrow:
             points = self._arrow(points, line)
@@ -130,9 +168,13 @@ class Canvas:
             at = (centre[0] * self.ss, centre[1] * self.ss)
             self.pg.draw.circle(self.surface, line[:3], at, (radius + 0.5 * style.width) * self.ss, self._width(style))
             return
+        if fill is None and line is not None and style.dash is not None and radius < 5000.0:
+            x, y = centre
+            ring = _ring(round(radius, 1), *style.dash) + np.array((x, y, x, y))
+            self._dashes(seen(ring, self.frame), line, style)
+            return
         n = int(np.clip(radius * 0.8, 24, 360))
-        b = np.linspace(0.0, 2.0 * math.pi, n, endpoint=False)
-        self.polygon(np.column_stack((centre[0] + radius * np.cos(b), centre[1] + radius * np.sin(b))), role)
+        self.polygon(radius * _unit_circle(n) + centre, role)
 
     def dots(self, points: Points, role: str, px: float) -> None:
         """Small discs."""
@@ -141,7 +183,7 @@ class Canvas:
         if colour is None:
             return
         radius = max(round(0.5 * px * self.ss), 1)
-        for x, y in np.rint(self._visible(points) * self.ss).astype(int).tolist():
+        for x, y in np.rint(seen(points, self.frame) * self.ss).astype(int).tolist():
             if colour[3] < 255:
                 self.pg.gfxdraw.filled_circle(self.surface, x, y, radius, colour)
             else:
@@ -150,8 +192,9 @@ class Canvas:
     def tint(self, points: Points, role: str) -> None:
         """Fill an outline as if its translucent colour lay on the bare sea: where two overlap it is no darker."""
         fill = self.style(role)[1]
-        if fill is not None:
-            self._fill(points, self._on_sea(fill))
+        shape = clip(points, self.frame)
+        if fill is not None and len(shape) > 2:
+            self._fill(shape, self._on_sea(fill))
 
     # --- text --------------------------------------------------------------------------------------------------------
     def text(
@@ -165,22 +208,20 @@ class Canvas:
     ) -> None:
         """Text with its top left at ``at``; align 0.5 centres it, 1 ends it there.  The halo is in the area colour."""
         style = STYLES[role]
-        image = text_surface(text, size, style.line(self.palette), style.fill(self.palette) if halo else "")
-        x = at[0] - align * (image.get_width() - (2 if halo else 0)) - (1 if halo else 0)
-        self._text.append((image, (round(x), round(at[1]) - (1 if halo else 0))))
+        edge = 1 if halo else 0
+        fill = style.fill(self.palette) if halo else ""
+        image = text_surface(text, round(size * self.ratio), style.line(self.palette), fill)
+        x = at[0] * self.ratio - align * (image.get_width() - 2 * edge) - edge
+        self._text.append((image, (round(x), round(at[1] * self.ratio) - edge)))
 
-    def finish(self) -> NDArray[np.uint8]:
-        """The picture, [height, width, 3]."""
-        pg = self.pg
-        out = self.surface if self.ss == 1 else pg.transform.smoothscale(self.surface, self.size)
+    def finish(self) -> Any:
+        """The picture as a surface."""
+        whole = self.surface.get_size() == self.pixels
+        out = self.surface if whole else self.pg.transform.smoothscale(self.surface, self.pixels)
         out.blits(self._text, doreturn=False)
-        pixels = np.frombuffer(pg.image.tobytes(out, "RGB"), dtype=np.uint8)
-        return pixels.reshape(self.size[1], self.size[0], 3).copy()  # writable, like any array of an environment
+        return out
 
     # --- the inner drawing -----------------------------------------------------------------------------------------
-    def _frame(self) -> tuple[float, float, float, float]:
-        return -20.0, -20.0, self.size[0] + 20.0, self.size[1] + 20.0
-
     def _on_sea(self, colour: RGBA) -> RGBA:
         """Opaque colour of a translucent one over the bare sea."""
         if colour[3] == 255:
@@ -189,43 +230,39 @@ class Canvas:
         r, g, b = (round(k * c + (1.0 - k) * s) for c, s in zip(colour[:3], sea[:3], strict=True))
         return r, g, b, 255
 
-    def _visible(self, points: Points) -> Points:
-        x0, y0, x1, y1 = self._frame()
-        inside = (points[:, 0] > x0) & (points[:, 0] < x1) & (points[:, 1] > y0) & (points[:, 1] < y1)
-        return points[inside]
-
     def _width(self, style: Style) -> int:
         return max(round(style.width * self.ss), 1)
 
-    def _fill(self, points: Points, colour: RGBA) -> None:
-        shape = clip(points, self._frame())
-        if len(shape) < 3:
-            return
+    def _fill(self, shape: Points, colour: RGBA) -> None:
         corners = np.rint(shape * self.ss).astype(int).tolist()
         if colour[3] < 255:
             self.pg.gfxdraw.filled_polygon(self.surface, corners, colour)
         else:
             self.pg.draw.polygon(self.surface, colour[:3], corners)
 
-    def _stroke(self, points: Points, colour: RGBA, style: Style) -> None:
+    def _stroke(self, points: Points, colour: RGBA, style: Style, closed: bool = False) -> None:
         """Lines of the style's width with round joints."""
-        x0, y0, x1, y1 = self._frame()
-        low, high = points.min(axis=0), points.max(axis=0)
-        if high[0] < x0 or low[0] > x1 or high[1] < y0 or low[1] > y1:
-            return
-        width = self._width(style)
-        colour = self._on_sea(colour)  # thin decoration needs no true blending
+        draw, surface, width = self.pg.draw, self.surface, self._width(style)
+        rgb = self._on_sea(colour)[:3]  # thin decoration needs no true blending
         if style.dash is not None:
-            for p, q in dashes(points, *style.dash, (x0, y0, x1, y1)):
-                self.pg.draw.line(self.surface, colour[:3], p * self.ss, q * self.ss, width)
+            line = np.vstack((points, points[:1])) if closed else points
+            self._dashes(dashes(line, *style.dash, self.frame), colour, style)
             return
         path = _thin(points) * self.ss
-        self.pg.draw.lines(self.surface, colour[:3], False, path.tolist(), width)
-        if width > 2:  # fill the notch on the outside of bends
-            a, b = np.diff(path[:-1], axis=0), np.diff(path[1:], axis=0)
-            bend = (a * b).sum(axis=1) < 0.96 * np.hypot(*a.T) * np.hypot(*b.T)
+        draw.lines(surface, rgb, closed, path.tolist(), width)
+        if width > 2 and len(path) > 2:  # fill the notch on the outside of bends
+            if closed:
+                path = np.vstack((path[-1:], path, path[:1]))
+            leg = path[1:] - path[:-1]
+            length = np.hypot(leg[:, 0], leg[:, 1])
+            bend = (leg[:-1] * leg[1:]).sum(axis=1) < 0.96 * length[:-1] * length[1:]
             for p in path[1:-1][bend].tolist():
-                self.pg.draw.circle(self.surface, colour[:3], p, 0.5 * width)
+                draw.circle(surface, rgb, p, 0.5 * width)
+
+    def _dashes(self, pieces: Points, colour: RGBA, style: Style) -> None:
+        line, surface, width, rgb = self.pg.draw.line, self.surface, self._width(style), self._on_sea(colour)[:3]
+        for x0, y0, x1, y1 in (self.ss * pieces).tolist():
+            line(surface, rgb, (x0, y0), (x1, y1), width)
 
     def _arrow(self, points: Points, colour: RGBA) -> Points:
         """Draw the head at the end of a line and return the line without it."""
@@ -237,7 +274,9 @@ class Canvas:
         along = (tip - back) / length
         across = np.array([-along[1], along[0]])
         base = tip - size * along
-        self._fill(np.array([tip, base + 0.38 * size * across, base - 0.38 * size * across]), (*colour[:3], 255))
+        head = clip(np.array([tip, base + 0.38 * size * across, base - 0.38 * size * across]), self.frame)
+        if len(head) > 2:
+            self._fill(head, (*colour[:3], 255))
         return np.vstack((points[:-1], base))
 
 
@@ -261,28 +300,41 @@ def _thin(points: Points) -> Points:
     return points[keep]
 
 
-def dashes(
-    points: Points, on: float, off: float, frame: tuple[float, float, float, float]
-) -> list[tuple[Points, Points]]:
-    """Pieces of a line that are drawn when ``on`` pixels are, then ``off`` are not; only those in the frame."""
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+def dashes(points: Points, on: float, off: float, frame: Frame) -> Points:
+    """Pieces of a line that are drawn when ``on`` pixels are, then ``off`` are not: [n, 4] x, y, x, y in the frame."""
+    along = np.concatenate(((0.0,), np.hypot(*np.diff(points, axis=0).T).cumsum()))
     starts = np.arange(0.0, along[-1], on + off)[:20000]
-    ends = np.minimum(starts + on, along[-1])
-    a = np.column_stack([np.interp(starts, along, points[:, i]) for i in range(2)])
-    b = np.column_stack([np.interp(ends, along, points[:, i]) for i in range(2)])
+    n, at = len(starts), np.concatenate((starts, np.minimum(starts + on, along[-1])))
+    x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
+    return seen(np.column_stack((x[:n], y[:n], x[n:], y[n:])), frame)
+
+
+def seen(points: Points, frame: Frame) -> Points:
+    """Those of points [n, >= 2] whose x, y lie in a rectangle."""
     x0, y0, x1, y1 = frame
-    seen = (a[:, 0] > x0) & (a[:, 0] < x1) & (a[:, 1] > y0) & (a[:, 1] < y1)
-    return list(zip(a[seen], b[seen], strict=True))
+    x, y = points[:, 0], points[:, 1]
+    return points[(x > x0) & (x < x1) & (y > y0) & (y < y1)]
 
 
-def clip(points: Points, frame: tuple[float, float, float, float]) -> Points:
+INSIDE, ACROSS, OUTSIDE = range(3)
+
+
+def _where(points: Points, frame: Frame) -> int:
+    """How points lie to a rectangle; plain numbers, for most outlines are short."""
+    x, y = zip(*points.tolist(), strict=True)
+    left, right, top, bottom = min(x), max(x), min(y), max(y)
+    x0, y0, x1, y1 = frame
+    if left >= x0 and top >= y0 and right <= x1 and bottom <= y1:
+        return INSIDE
+    return OUTSIDE if right < x0 or bottom < y0 or left > x1 or top > y1 else ACROSS
+
+
+def clip(points: Points, frame: Frame) -> Points:
     """Part of a polygon inside a rectangle (Sutherland-Hodgman), for gfxdraw counts pixels in 16 bits."""
+    where = _where(points, frame)
+    if where != ACROSS:
+        return points if where == INSIDE else points[:0]
     x0, y0, x1, y1 = frame
-    low, high = points.min(axis=0), points.max(axis=0)
-    if low[0] >= x0 and low[1] >= y0 and high[0] <= x1 and high[1] <= y1:
-        return points
-    if high[0] < x0 or high[1] < y0 or low[0] > x1 or low[1] > y1:
-        return points[:0]
     shape = points.tolist()
     for axis, bound, sign in ((0, x0, 1.0), (0, x1, -1.0), (1, y0, 1.0), (1, y1, -1.0)):
         out: list[list[float]] = []

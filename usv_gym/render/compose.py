@@ -9,10 +9,12 @@ import numpy as np
 
 from ..units import DEG, KNOT, wrap_360
 from . import shapes
-from .panel import clock, target_name
+from .panel import clock, target_name, target_row
 from .primitives import LAYERS, Circle, Dots, Label, Panel, Points, Polygon, Polyline, Primitive, Scene
 from .sea import DESCRIPTORS, HULLS, OBSTACLES, Detection, Sea, Trail
 
+DOMAIN = (4.0, 1.6)  #: semi-axes of the ship domain along and across, in lengths
+CPA_SECONDS, CPA_METRES = 300.0, 150.0  #: closest approaches to come are marked if this soon and this near
 VECTOR_SECONDS = 60.0  #: a speed vector shows where a vessel is after this time
 HULL_PX, OWN_PX, OBSTACLE_PX, AIS_PX = 16.0, 24.0, 10.0, 14.0  #: smallest sizes on the picture
 
@@ -26,6 +28,8 @@ def compose(
     extent: tuple[float, float, float, float],
     extra: Mapping[str, Iterable[Primitive]] | None = None,
     hide: Sequence[str] = (),
+    *,
+    forecast: bool = False,
 ) -> Scene:
     """Scene of one instant.
 
@@ -43,6 +47,8 @@ def compose(
         more primitives by layer, drawn over those of the same layer.
     hide
         names of layers to leave out.
+    forecast
+        whether to mark the closest approach to come.
     """
     layers: Layers = {name: [] for name in LAYERS}
     _shadows(layers["shadows"], sea)
@@ -61,7 +67,9 @@ def compose(
         _detection(layers, d)
     _labels(layers["labels"], sea)
     if sea.active[sea.own]:
-        _own(layers["own"], sea)
+        _own(layers, sea)
+        if forecast:
+            _forecast(layers, sea)
     for name, primitives in (extra or {}).items():
         layers[name].extend(primitives)
     for name in hide:
@@ -113,7 +121,7 @@ def _rings(layers: Layers, sea: Sea, extent: tuple[float, float, float, float]) 
         b = degrees * DEG
         inward = (0.95 if degrees % 30 == 0 else 0.975) * compass
         ends = [(here[0] + r * math.cos(b), here[1] + r * math.sin(b)) for r in (compass, inward)]
-        rings.append(Polyline(np.array(ends), "ring_radar" if compass == sea.radar_range else "ring"))
+        rings.append(Polyline(np.array(ends), "ring_radar" if compass == sea.radar_range else "ring_tick"))
         if degrees % 30 == 0:
             at = (here[0] + 0.91 * compass * math.cos(b), here[1] + 0.91 * compass * math.sin(b))
             layers["labels"].append(Label((f"{degrees:03d}",), at, "label_ring", priority=-1.0, fixed=True))
@@ -197,14 +205,37 @@ def _vessel(layers: Layers, sea: Sea, j: int) -> None:
     _vector(layers["vessels"], sea.place(j), sea.velocity[j], "vector")
 
 
-def _own(layer: list[Primitive], sea: Sea) -> None:
-    """The own ship: heading line, speed vector, hull."""
-    at, psi = sea.here, float(sea.eta[sea.own, 2])
+def _own(layers: Layers, sea: Sea) -> None:
+    """The own ship: its domain, heading line, speed vector, hull.
+
+    The domain is that of Fujii and Tanaka (1971): an ellipse of 4 lengths ahead and astern and 1.6 lengths to either side.
+    """
+    at, psi, layer = sea.here, float(sea.eta[sea.own, 2]), layers["own"]
+    length = float(sea.length[sea.own])
+    outline = shapes.ellipse(at, DOMAIN[0] * length, DOMAIN[1] * length, psi)
+    layers["rings"].append(Polygon(outline, "domain"))
     reach = max(float(np.hypot(*sea.velocity[sea.own])) * VECTOR_SECONDS, 6.0 * float(sea.length[sea.own]))
     ahead = (at[0] + reach * math.cos(psi), at[1] + reach * math.sin(psi))
     layer.append(Polyline(np.array([at, ahead]), "own_heading"))
     _vector(layer, at, sea.velocity[sea.own], "own_vector")
     layer += _hull(sea, sea.own, "own_hull", "own_house", OWN_PX)
+
+
+def _forecast(layers: Layers, sea: Sea) -> None:
+    """Where own ship and target will be when they are closest, for the target that the picture says comes closest."""
+    best = min(((row.cpa, row.tcpa, d) for d, row in ((d, target_row(sea, d)) for d in sea.detections)
+                if 1.0 < row.tcpa < CPA_SECONDS and row.cpa < CPA_METRES), key=lambda b: b[:2], default=None)  # fmt: skip
+    if best is None:
+        return
+    cpa, tcpa, d = best
+    own = np.add(sea.here, tcpa * sea.velocity[sea.own])
+    target = np.array(d.position)
+    if d.motion_known and math.isfinite(d.sog) and math.isfinite(d.cog):
+        target = target + tcpa * d.sog * np.array([math.cos(d.cog), math.sin(d.cog)])
+    layers["symbols"] += [Polyline(np.array([own, target]), "cpa"), Dots(np.array([own, target]), "cpa_dot", 5.0)]
+    middle = 0.5 * (own + target)
+    text = f"CPA {target_name(d)} {cpa:.0f} m in {clock(tcpa)}"
+    layers["labels"].append(Label((text,), (float(middle[0]), float(middle[1])), "label_cpa", priority=7.0))
 
 
 def _hull(sea: Sea, j: int, role: str, house_role: str, min_px: float) -> list[Primitive]:

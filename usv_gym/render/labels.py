@@ -21,7 +21,8 @@ LEADER = 14.0  #: [px] a label further from its object than this gets a line to 
 _ANGLES = np.radians([0, 180, 45, -45, 135, -135, 90, -90, 20, -20, 160, -160])
 _DIRECTIONS = np.column_stack((np.cos(_ANGLES), np.sin(_ANGLES)))
 _PREFERENCE = np.array([0.0, 1.5, 1.0, 1.0, 2.5, 2.5, 3.0, 3.0, 0.8, 0.8, 2.0, 2.0])
-_DISTANCES = np.array([0.0, 7.0, 16.0, 28.0, 44.0, 64.0, 90.0])
+_OUTWARD = np.clip(1.5 * _DIRECTIONS, -1.0, 1.0)
+_DISTANCES = (0.0, 7.0, 16.0, 28.0, 44.0, 64.0, 90.0)
 
 
 @dataclass(frozen=True)
@@ -70,42 +71,53 @@ def place(
         for each request its place, or None when there is none: two labels never overlap.
     """
     out: list[Placed | None] = [None] * len(requests)
-    taken: list[Box] = list(keep_out)
+    hard = np.zeros((len(keep_out) + len(requests), 4))  # what is taken
+    hard[: len(keep_out)] = np.reshape(keep_out, (-1, 4))
+    taken = len(keep_out)
     soft = np.array(avoid, dtype=np.float64).reshape(-1, 4)
     for i in sorted(range(len(requests)), key=lambda k: -requests[k].priority):
         request = requests[i]
         if not (frame[0] <= request.anchor[0] <= frame[2] and frame[1] <= request.anchor[1] <= frame[3]):
             continue  # what it belongs to is out of sight
-        boxes, cost = _candidates(request)
-        inside = (boxes[:, :2] >= frame[:2]).all(axis=1) & (boxes[:, 2:] <= frame[2:]).all(axis=1)
-        hard = np.array(taken, dtype=np.float64).reshape(-1, 4)
-        free = inside & (_overlap(boxes, hard).sum(axis=1) == 0.0)
-        covered = _overlap(boxes, soft).sum(axis=1) / (request.size[0] * request.size[1])
-        if request.fixed:
-            free &= covered == 0.0
-        if not free.any():
-            continue
-        cost = np.where(free, cost + 60.0 * covered, np.inf)
-        best = int(cost.argmin())
-        box: Box = tuple(float(x) for x in boxes[best])  # type: ignore[assignment]
-        taken.append(box)
-        out[i] = Placed(box, _leader(request, box))
+        box = _best(request, frame, hard[:taken], soft)
+        if box is not None:
+            hard[taken] = box
+            taken += 1
+            out[i] = Placed(box, _leader(request, box))
     return out
 
 
-def _candidates(request: Request) -> tuple[Boxes, NDArray[np.float64]]:
-    """Boxes [n, 4] around the anchor and what each costs [n]."""
-    w, h = request.size
-    x, y = request.anchor
+def _best(request: Request, frame: Box, hard: Boxes, soft: Boxes) -> Box | None:
+    """The cheapest free box, looking further away only while that could be cheaper."""
+    (w, h), (x, y) = request.size, request.anchor
+    half = np.array((0.5 * w, 0.5 * h))
     if request.fixed:
-        return np.array([(x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h)]), np.zeros(1)
-    distances = _DISTANCES[request.far >= _DISTANCES, None]
-    reach = request.clearance + GAP + distances
-    # the box touches the circle of `reach`: its centre is further out by its own half extent in that direction
-    cx = x + reach * _DIRECTIONS[:, 0] + 0.5 * w * np.clip(_DIRECTIONS[:, 0] * 1.5, -1.0, 1.0)
-    cy = y + reach * _DIRECTIONS[:, 1] + 0.5 * h * np.clip(_DIRECTIONS[:, 1] * 1.5, -1.0, 1.0)
-    boxes = np.stack((cx - 0.5 * w, cy - 0.5 * h, cx + 0.5 * w, cy + 0.5 * h), axis=-1).reshape(-1, 4)
-    return boxes, (0.45 * distances + _PREFERENCE).ravel()
+        box = (x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h)
+        free = _inside(np.array([box]), frame)[0] and not _overlap(np.array([box]), np.vstack((hard, soft))).any()
+        return box if free else None
+    best, cheapest = None, math.inf
+    for distance in _DISTANCES:
+        if distance > request.far or 0.45 * distance >= cheapest:
+            break
+        # a box touches the circle of `reach`: its centre is further out by its own half extent in that direction
+        reach = request.clearance + GAP + distance
+        centres = (x, y) + reach * _DIRECTIONS + half * _OUTWARD
+        boxes = np.hstack((centres - half, centres + half))
+        free = _inside(boxes, frame) & (_overlap(boxes, hard).sum(axis=1) == 0.0)
+        if not free.any():
+            continue
+        covered = _overlap(boxes, soft).sum(axis=1) / (w * h)
+        cost = np.where(free, 0.45 * distance + _PREFERENCE + 60.0 * covered, math.inf)
+        k = int(cost.argmin())
+        if cost[k] < cheapest:
+            best, cheapest = boxes[k], float(cost[k])
+    return None if best is None else tuple(best.tolist())
+
+
+def _inside(boxes: Boxes, frame: Box) -> NDArray[np.bool_]:
+    """Which boxes [n, 4] lie in the frame."""
+    inside = (boxes[:, :2] >= frame[:2]) & (boxes[:, 2:] <= frame[2:])
+    return np.asarray(inside.all(axis=1))
 
 
 def _overlap(boxes: Boxes, others: Boxes) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .canvas import Canvas, text_size
+from .canvas import Canvas, fitting, text_size
 from .panel import clock
 from .primitives import Panel, Plot, Points, Series, TargetRow
 from .shapes import nice_step
@@ -14,6 +14,7 @@ from .shapes import nice_step
 WIDTH = 380  #: [px]
 PAD = 13.0
 ROW = 20.0  #: [px] height of a row of the table
+LEAST = 3  #: rows of the table that are worth more than a plot
 PLOT = 112.0  #: [px] least height of a plot
 #: columns of the table: title, offset from the left, alignment
 COLUMNS = (("ID", 0.0, 0.0), ("TYPE", 44.0, 0.0), ("BRG", 138.0, 1.0), ("RNG m", 194.0, 1.0), ("CPA m", 244.0, 1.0),
@@ -27,26 +28,22 @@ def draw_panel(canvas: Canvas, panel: Panel, box: tuple[float, float, float, flo
     left, right = x0 + PAD, x1 - PAD
     canvas.text(panel.title, (left, y0 + 10.0), "text", 16)
     canvas.text("".join(panel.status[:1]), (right, y0 + 11.0), "text", 14, 1.0)
-    canvas.text(_fitting(panel.status[1:], right - left), (left, y0 + 30.0), "text_muted", 12)
+    canvas.text(fitting("  ·  ".join(panel.status[1:]), right - left, 12), (left, y0 + 30.0), "text_muted", 12)
     y = _gauges(canvas, panel.gauges, left, right, y0 + 50.0)
+
+    def rows(plots: int) -> int:
+        """Rows of the table that fit above so many plots."""
+        return int((y1 - y - PAD - plots * (PLOT + 8.0) - 42.0) // ROW)
+
     plots = len(panel.plots)
-    room = y1 - y - PAD - plots * (PLOT + 8.0)
-    y = _table(canvas, panel.targets, left, right, y + 6.0, int((room - 42.0) // ROW))
+    while plots and rows(plots) < min(LEAST, len(panel.targets)):
+        plots -= 1
+    y = _table(canvas, panel.targets, left, right, y + 6.0, rows(plots))
     if plots:
         height = min((y1 - PAD - y - 8.0 * (plots - 1)) / plots, 170.0)
-        for k, plot in enumerate(panel.plots):
+        for k, plot in enumerate(panel.plots[:plots]):
             top = y + k * (height + 8.0)
             _plot(canvas, plot, (left, top, right, top + height))
-
-
-def _fitting(texts: tuple[str, ...], room: float) -> str:
-    """Scenario, policy, seed on one line, shortened when it would not fit."""
-    line = "  ·  ".join(texts)
-    if text_size(line, 12)[0] <= room:
-        return line
-    while line and text_size(line + "…", 12)[0] > room:
-        line = line[:-1]
-    return line + "…"
 
 
 def _gauges(canvas: Canvas, gauges: tuple[tuple[str, str], ...], left: float, right: float, y: float) -> float:

@@ -45,6 +45,20 @@ class View:
         scale = min(width / max(east - west, 1.0), height / max(north - south, 1.0))
         return View(0.5 * (south + north), 0.5 * (west + east), scale)
 
+    def pixel(self, place: tuple[float, float], size: tuple[float, float]) -> tuple[float, float]:
+        """Where north, east [m] is in a map of this width and height: x, y [px]."""
+        return (
+            0.5 * size[0] + (place[1] - self.east) * self.scale,
+            0.5 * size[1] - (place[0] - self.north) * self.scale,
+        )
+
+    def place(self, pixel: tuple[float, float], size: tuple[float, float]) -> tuple[float, float]:
+        """The opposite of `pixel`: north, east [m]."""
+        return (
+            self.north + (0.5 * size[1] - pixel[1]) / self.scale,
+            self.east + (pixel[0] - 0.5 * size[0]) / self.scale,
+        )
+
 
 def render(
     scene: Scene,
@@ -54,15 +68,32 @@ def render(
     *,
     panel: bool | None = None,
     supersample: int = 2,
+    ratio: float = 1.0,
 ) -> NDArray[np.uint8]:
-    """Picture of a scene.
+    """Picture of a scene as an array [height, width, 3] of red, green, blue; parameters and errors as `draw`."""
+    surface = draw(scene, size, palette, view, panel=panel, supersample=supersample, ratio=ratio)
+    pixels = np.frombuffer(load_pygame().image.tobytes(surface, "RGB"), dtype=np.uint8)
+    return pixels.reshape(size[1], size[0], 3).copy()  # writable, like any array of an environment
+
+
+def draw(
+    scene: Scene,
+    size: tuple[int, int] = (1180, 800),
+    palette: str = "day",
+    view: View | None = None,
+    *,
+    panel: bool | None = None,
+    supersample: int = 2,
+    ratio: float = 1.0,
+) -> Any:
+    """Picture of a scene as a pygame surface.
 
     Parameters
     ----------
     scene
         what to draw.
     size
-        width and height [px].
+        width and height in pixels.
     palette
         "day", "dark" or "night".
     view
@@ -71,11 +102,8 @@ def render(
         whether gauges, targets and plots stand beside the map; when None, if that leaves the map most of the picture.
     supersample
         smoothness: 1 is jagged and fastest, 2 is good, 3 for print.
-
-    Returns
-    -------
-    array
-        uint8 [height, width, 3], red, green, blue.
+    ratio
+        how large text and symbols are: 2 for a screen of high density.
 
     Raises
     ------
@@ -86,16 +114,22 @@ def render(
     """
     if palette not in PALETTES:
         raise ValueError(f"unknown palette {palette!r}: one of {', '.join(PALETTES)}")
-    if min(size) < 1 or supersample < 1:
-        raise ValueError(f"size and supersample must be positive, not {size} and {supersample}")
-    beside = size[0] - PANEL_WIDTH >= 0.6 * size[1] if panel is None else panel
-    canvas = Canvas(size, palette, supersample)
-    width = size[0] - PANEL_WIDTH if beside else size[0]
+    if min(size) < 1 or supersample < 1 or not ratio > 0.0:
+        raise ValueError(f"size, supersample and ratio must be positive, not {size}, {supersample} and {ratio}")
+    canvas = Canvas(size, palette, supersample, ratio)
+    width, height = map_size(canvas.size, panel)
     if width > 0:
-        _Map(canvas, scene, width, size[1], view or View.fit(scene.extent, width, size[1]), title=not beside).draw()
-    if beside:
-        draw_panel(canvas, scene.panel, (max(width, 0), 0, size[0], size[1]))
+        beside = width < canvas.size[0]
+        _Map(canvas, scene, width, height, view or View.fit(scene.extent, width, height), title=not beside).draw()
+    if width < canvas.size[0]:
+        draw_panel(canvas, scene.panel, (width, 0, *canvas.size))
     return canvas.finish()
+
+
+def map_size(size: tuple[float, float], panel: bool | None = None) -> tuple[float, float]:
+    """Width and height [px] that the map has of a picture; the rest of the width is the panel's."""
+    beside = size[0] - PANEL_WIDTH >= 0.6 * size[1] if panel is None else panel
+    return (max(size[0] - PANEL_WIDTH, 0.0) if beside else size[0]), size[1]
 
 
 def save_png(picture: NDArray[np.uint8] | Scene, path: str | os.PathLike[str], **options: Any) -> None:
@@ -117,10 +151,12 @@ def save_png(picture: NDArray[np.uint8] | Scene, path: str | os.PathLike[str], *
 class _Map:
     """The map of one picture, in the rectangle (0, 0, width, height) of a canvas."""
 
-    def __init__(self, canvas: Canvas, scene: Scene, width: int, height: int, view: View, title: bool) -> None:
+    def __init__(self, canvas: Canvas, scene: Scene, width: float, height: float, view: View, title: bool) -> None:
         self.canvas, self.scene, self.view = canvas, scene, view
         self.width, self.height, self.title = width, height, title
         self.step = nice_step(width / view.scale, 8.0)  # of the grid [m]
+        self._turn = np.array([(0.0, -view.scale), (view.scale, 0.0)])  # north, east to x, y
+        self._origin = np.array(self._at((0.0, 0.0)))
         self.bodies: list[Box] = []  # hulls and obstacles: labels rather stand beside them
 
     def draw(self) -> None:
@@ -141,12 +177,11 @@ class _Map:
 
     def px(self, points: Points) -> Points:
         """Metres {n} to pixels, [n, 2]."""
-        return points[:, ::-1] * (self.view.scale, -self.view.scale) + self._at((0.0, 0.0))
+        out: Points = points @ self._turn + self._origin
+        return out
 
     def _at(self, place: tuple[float, float]) -> tuple[float, float]:
-        view = self.view
-        x = 0.5 * self.width + (place[1] - view.east) * view.scale
-        return x, 0.5 * self.height - (place[0] - view.north) * view.scale
+        return self.view.pixel(place, (self.width, self.height))
 
     def _primitive(self, p: Primitive, body: bool) -> None:
         if isinstance(p, Polygon):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from .compose import compose
 from .panel import panel, plots
-from .primitives import Scene
+from .primitives import Primitive, Scene
 from .scene_episode import scene_from_episode
 from .sea import AisReport, Detection, History, Sea, sides
 
@@ -25,6 +25,7 @@ def scene_from_snapshot(
     half_width: float = 450.0,
     status: Sequence[str] = (),
     hide: Sequence[str] = (),
+    extra: Mapping[str, Sequence[Primitive]] | None = None,
 ) -> Scene:
     """Scene of a live world, centred on the own ship.
 
@@ -44,6 +45,8 @@ def scene_from_snapshot(
         texts beside the title, after the time (scenario, seed, policy).
     hide
         names of layers to leave out, see `usv_gym.render.primitives.LAYERS`.
+    extra
+        more primitives by layer, drawn over those of the same layer.
     """
     sea = sea_from_record(world, names, observer)
     curves = None
@@ -56,7 +59,9 @@ def scene_from_snapshot(
         trails.trails() if trails is not None else {},
         panel(sea, (f"t = {sea.t:.1f} s", *status), plots(*curves) if curves is not None else ()),
         (n - half_width, n + half_width, e - half_width, e + half_width),
-        hide=hide,
+        extra,
+        hide,
+        forecast=True,
     )
 
 

@@ -27,6 +27,9 @@ def scene_from_episode(
     marked: int = MARKED,
     status: Sequence[str] | None = None,
     hide: Sequence[str] = (),
+    future: bool = True,
+    half_width: float | None = None,
+    extra: Mapping[str, Sequence[Primitive]] | None = None,
 ) -> Scene:
     """Scene of an archive: whole tracks, and everything else as it was at one time.
 
@@ -42,6 +45,12 @@ def scene_from_episode(
         texts beside the title, after the time; scenario, seed and policy when None.
     hide
         names of layers to leave out, see `usv_gym.render.primitives.LAYERS`.
+    future
+        whether tracks and closest approaches after t are shown.
+    half_width
+        [m] from the own ship to the edge of the map; everything that came near is in view when None.
+    extra
+        more primitives by layer, drawn over those of the same layer.
 
     Raises
     ------
@@ -52,28 +61,41 @@ def scene_from_episode(
     if t is not None and not start <= t <= end:
         raise ValueError(f"t = {t:g} s lies outside the episode ({start:g} to {end:g} s)")
     i = len(episode.t) - 1 if t is None else int(np.searchsorted(episode.t, t, side="right")) - 1
-    sea = sea_from_episode(episode, i)
+    sea = sea_from_episode(episode, i, 0.0 if t is None else t)
+    last = math.inf if future else sea.t
     speed = np.hypot(episode.nu[:, sea.own, 0], episode.nu[:, sea.own, 1])
     curves = plots(episode.t, speed, episode.eta[:, sea.own, 2], _nearest(episode), marker=None if t is None else sea.t)
     texts = _status(episode.meta) if status is None else tuple(status)
-    labels, marks = _approaches(episode, marked)
-    extra: dict[str, list[Primitive]] = {"detections": _past(episode, sea.t), "symbols": marks, "labels": labels}
-    trails = {j: _trail(episode, j) for j in range(sea.vessels)}
+    labels, marks = _approaches(episode, marked, last)
+    more: dict[str, list[Primitive]] = {"detections": _past(episode, sea.t), "symbols": marks, "labels": labels}
+    for name, primitives in (extra or {}).items():
+        more.setdefault(name, []).extend(primitives)
+    (n, e), r = sea.here, half_width or 0.0
+    trails = {j: _trail(episode, j, sea, future) for j in range(sea.vessels)}
     return compose(
         sea,
         {j: trail for j, trail in trails.items() if len(trail.t) > 1},
         panel(sea, (f"t = {clock(sea.t)}", *texts), curves),
-        _extent(episode, sea),
-        extra,
+        (n - r, n + r, e - r, e + r) if half_width else _extent(episode, sea),
+        more,
         hide,
+        forecast=t is not None,
     )
 
 
-def sea_from_episode(episode: Episode, i: int) -> Sea:
-    """What there was on the sea at sample i."""
+def sea_from_episode(episode: Episode, i: int, t: float = 0.0) -> Sea:
+    """What there was on the sea at sample i; at a time t [s] before the next sample, everything has moved on its way there."""
     meta, now = episode.meta, float(episode.t[i])
+    eta, obstacle = episode.eta[i], episode.obstacle[i]
+    if t > now and i + 1 < len(episode.t):
+        share, now = (t - now) / (float(episode.t[i + 1]) - now), t
+        there = (episode.active[i] & episode.active[i + 1])[:, None]
+        change = episode.eta[i + 1] - eta
+        change[:, 2] = (change[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        eta = eta + share * change * there[: len(eta)]
+        obstacle = obstacle + share * (episode.obstacle[i + 1] - obstacle) * there[len(eta) :]
     own = int(meta["own"])
-    psi, nu = episode.eta[i, :, 2], episode.nu[i]
+    psi, nu = eta[:, 2], episode.nu[i]
     sensors = meta.get("sensors", {})
     waypoints = meta.get("waypoints") or []
     radii = meta.get("acceptance_radius") or []
@@ -85,14 +107,14 @@ def sea_from_episode(episode: Episode, i: int) -> Sea:
         names=meta.get("names", []),
         kind=np.asarray(meta["kinds"]),
         active=episode.active[i],
-        eta=episode.eta[i],
+        eta=eta,
         velocity=np.column_stack(
             (nu[:, 0] * np.cos(psi) - nu[:, 1] * np.sin(psi), nu[:, 0] * np.sin(psi) + nu[:, 1] * np.cos(psi))
         ),
         rot=nu[:, 2],
         length=episode.length,
         beam=episode.beam,
-        position=episode.obstacle[i],
+        position=obstacle,
         radius=episode.radius,
         distance=episode.distance[i].astype(np.float64),
         detections=_detections(episode.detections, now),
@@ -151,9 +173,12 @@ def _reports(table: Any, now: float) -> list[AisReport]:
     ]
 
 
-def _trail(episode: Episode, j: int) -> Trail:
+def _trail(episode: Episode, j: int, sea: Sea, future: bool) -> Trail:
     on = episode.active[:, j]
-    return Trail(episode.t[on], episode.eta[on, j])
+    if future:
+        return Trail(episode.t[on], episode.eta[on, j])
+    on = on & (episode.t < sea.t)
+    return Trail(np.append(episode.t[on], sea.t), np.vstack((episode.eta[on, j], sea.eta[j])))
 
 
 def _hull_distances(episode: Episode) -> Points:
@@ -176,7 +201,7 @@ def _past(episode: Episode, now: float) -> list[Primitive]:
     return [Dots(np.column_stack((past["north"], past["east"])), "detection_past", 2.5)] if len(past) else []
 
 
-def _approaches(episode: Episode, marked: int) -> tuple[list[Primitive], list[Primitive]]:
+def _approaches(episode: Episode, marked: int, last: float) -> tuple[list[Primitive], list[Primitive]]:
     """Labels and marks of the nearest of the closest approaches: a line between the two as they were then."""
     labels: list[Primitive] = []
     marks: list[Primitive] = []
@@ -186,6 +211,8 @@ def _approaches(episode: Episode, marked: int) -> tuple[list[Primitive], list[Pr
         if not nearest[s] < NEAR:
             break
         i = int(distance[:, s].argmin())
+        if episode.t[i] > last:
+            continue
         own = episode.eta[i, int(episode.meta["own"]), :2]
         other = episode.position(int(s))[i]
         middle = (float(0.5 * (own[0] + other[0])), float(0.5 * (own[1] + other[1])))

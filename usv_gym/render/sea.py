@@ -140,17 +140,22 @@ class History:
     ----------
     seconds
         how far back it reaches.
+    every
+        [s] of two instants that are closer, only the later one is kept.
     """
 
-    def __init__(self, seconds: float = 120.0) -> None:
+    def __init__(self, seconds: float = 120.0, every: float = 0.25) -> None:
         """Empty memory."""
-        self.seconds = seconds
+        self.seconds, self.every = seconds, every
         self._rows: deque[tuple[float, Points, Points, NDArray[np.bool_], float]] = deque()
 
     def push(self, sea: Sea) -> None:
-        """Remember an instant; one that is not later than the last starts a new memory (the world was reset)."""
-        if self._rows and sea.t <= self._rows[-1][0]:
+        """Remember an instant; one that is earlier than the last starts a new memory (the world was reset)."""
+        if self._rows and sea.t < self._rows[-1][0]:
             self._rows.clear()
+        last, before = (self._rows[-k][0] if len(self._rows) >= k else -math.inf for k in (1, 2))
+        if sea.t == last or sea.t < before + self.every:
+            self._rows.pop()
         active = sea.active[: sea.vessels].copy()
         self._rows.append((sea.t, sea.eta.copy(), sea.velocity.copy(), active, sea.closest()[0]))
         while self._rows and self._rows[0][0] < sea.t - self.seconds:

@@ -43,9 +43,12 @@ def ellipse(centre: tuple[float, float], semi_along: float, semi_across: float, 
 
 def covariance_ellipse(centre: tuple[float, float], nn: float, ne: float, ee: float, sigmas: float = 2.0) -> Points:
     """Contour of ``sigmas`` standard deviations of a position with covariance [[nn, ne], [ne, ee]] [m^2]."""
-    values, vectors = np.linalg.eigh(np.array([(nn, ne), (ne, ee)]))
-    major, minor = sigmas * np.sqrt(np.maximum(values[::-1], 0.0))
-    return ellipse(centre, float(major), float(minor), math.atan2(vectors[1, 1], vectors[0, 1]))
+    # any square root of the covariance maps the unit circle on to that contour; this one is Cholesky's
+    a = math.sqrt(max(nn, 0.0))
+    b = ne / a if a > 0.0 else 0.0
+    c = math.sqrt(max(ee - b * b, 0.0))
+    out: Points = CIRCLE @ np.array([(sigmas * a, sigmas * b), (0.0, sigmas * c)]) + centre
+    return out
 
 
 def crag(centre: tuple[float, float], radius: float, index: int) -> tuple[Points, Points]:
@@ -85,9 +88,17 @@ def shadow(observer: tuple[float, float], centre: tuple[float, float], half: flo
         return None
     bearing, opening = math.atan2(de, dn), math.asin(half / d)
     tangent = math.sqrt(d * d - half * half)
-    near = arc(observer, tangent, bearing + opening, bearing - opening, 2)
-    far = arc(observer, reach, bearing - opening, bearing + opening, 2 + int(opening * 40.0))
-    return np.vstack((near, far))
+    b = bearing + opening * _fan(2 + int(opening * 40.0))
+    out = reach * np.column_stack((np.cos(b), np.sin(b)))
+    out[:2] *= tangent / reach
+    out += observer
+    return out
+
+
+@functools.cache
+def _fan(n: int) -> Points:
+    """From 1 to -1 along the near edge, and back in n steps along the far one."""
+    return np.concatenate(((1.0, -1.0), np.linspace(-1.0, 1.0, n)))
 
 
 def nice_step(span: float, parts: float) -> float:

@@ -217,6 +217,22 @@ def load(path: str | os.PathLike[str]) -> Episode:
     return episode
 
 
+def open_archive(path: str | os.PathLike[str]) -> Episode:
+    """Read an archive, or the ``episode.usv`` of a directory of results.
+
+    Raises
+    ------
+    ArchiveError
+        as `load`, and if the file cannot be read.
+    """
+    file = Path(path)
+    file = file / "episode.usv" if file.is_dir() else file
+    try:
+        return load(file)
+    except OSError as error:
+        raise ArchiveError(f"{file}: cannot be read: {error.strerror or error}") from None
+
+
 def _write(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # not the clock: equal episodes give equal bytes
     info.create_system = 3

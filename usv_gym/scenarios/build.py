@@ -12,7 +12,7 @@ from ..config import ConfigError
 from ..units import DEG, DEG_PER_MIN, KNOT, metres_per_degree
 from ..world import state
 from ..world.disturbance import set_weather
-from ..world.vessel import load_vessel, write_plant
+from ..world.vessel import VesselModel, load_vessel, write_plant
 from .schema import OWN_SHIP, GeoPoint, Preset, Scenario, Weather
 from .sensor_schema import Error, Lidar, Radar, Sensors
 
@@ -32,7 +32,12 @@ _AIS = {"off": state.AIS_NONE, "A": state.AIS_CLASS_A, "B": state.AIS_CLASS_B}
 
 
 def build_worlds(
-    scenario: Scenario, B: int = 1, *, capacity: tuple[int, int] | None = None, observers: Sequence[int] | None = None
+    scenario: Scenario,
+    B: int = 1,
+    *,
+    capacity: tuple[int, int] | None = None,
+    observers: Sequence[int] | None = None,
+    agents: int = 0,
 ) -> tuple[Worlds, Names]:
     """Allocate B worlds and write the scenario into each, with seed 0 (a reset draws the seeds).
 
@@ -46,38 +51,41 @@ def build_worlds(
         slots for vessels and for obstacles; default: the smallest capacity class that fits.
     observers
         vessel slots that carry sensors and a picture of their own; default: the own ship, slot 0.
+    agents
+        leave out the own ship and keep this many vessel slots, each with a plant, free for ``write_agent``.
 
     Raises
     ------
     ConfigError
         if there are more ships or obstacles than slots.
     """
-    vessels, obstacles = 1 + len(scenario.ships), len(scenario.obstacles)
+    vessels, obstacles = max(agents, 1) + len(scenario.ships), len(scenario.obstacles)
     watching = (0,) if observers is None else tuple(observers)
     try:
         V, M = state.capacity(vessels, obstacles) if capacity is None else capacity
     except ValueError as error:
         raise ConfigError(f"scenario {scenario.name!r}: {error}") from None
-    worlds: Worlds = np.zeros(B, state.world_dtype(V, M, len(watching)))
+    worlds: Worlds = np.zeros(B, state.world_dtype(V, M, len(watching), max(agents, 1)))
     if B > 0:
-        write_world(scenario, worlds, 0, 0, observers=watching)
+        write_world(scenario, worlds, 0, 0, observers=watching, agents=agents)
         worlds[1:] = worlds[0]
-    return worlds, source_names(scenario, V, M)
+    return worlds, source_names(scenario, V, M, agents)
 
 
-def source_names(scenario: Scenario, V: int, M: int) -> Names:
-    """Names of all sources: ``own_ship`` in slot 0, ships and obstacles in file order."""
-    vessels = [OWN_SHIP, *scenario.ships]
+def source_names(scenario: Scenario, V: int, M: int, agents: int = 0) -> Names:
+    """Names of all sources: ``own_ship`` in slot 0 (or slots for agents), then ships and obstacles in file order."""
+    vessels = [*([""] * agents if agents else [OWN_SHIP]), *scenario.ships]
     return [*vessels, *[""] * (V - len(vessels)), *scenario.obstacles, *[""] * (M - len(scenario.obstacles))]
 
 
 def write_world(
-    scenario: Scenario, worlds: Worlds, b: int, seed: int, *, observers: Sequence[int] | None = None
+    scenario: Scenario, worlds: Worlds, b: int, seed: int, *, observers: Sequence[int] | None = None, agents: int = 0
 ) -> None:
     """Fill row b of ``worlds`` completely, as it stands before the kernel ``reset_worlds`` starts it.
 
     Slot 0 is the own ship (3-DOF, plant 0, controlled), slots 1.. are the ships and the obstacles in file order.
-    ``observers`` defaults to the vessel slots 0, 1, .. as many as the record has.
+    ``observers`` defaults to the vessel slots 0, 1, .. as many as the record has.  With ``agents`` the first so many slots
+    stay empty and the ships follow them.
 
     Raises
     ------
@@ -86,9 +94,10 @@ def write_world(
     """
     w: Any = worlds[b]
     V, M = w["vessels"]["active"].shape[0], w["obstacles"]["active"].shape[0]
-    if 1 + len(scenario.ships) > V or len(scenario.obstacles) > M:
+    first = max(agents, 1)
+    if first + len(scenario.ships) > V or len(scenario.obstacles) > M:
         raise ConfigError(
-            f"scenario {scenario.name!r}: {1 + len(scenario.ships)} vessels and {len(scenario.obstacles)} obstacles "
+            f"scenario {scenario.name!r}: {first + len(scenario.ships)} vessels and {len(scenario.obstacles)} obstacles "
             f"do not fit into {V} and {M} slots"
         )
     worlds[b] = np.zeros((), worlds.dtype)
@@ -103,8 +112,9 @@ def write_world(
     w["observer"] = range(w["observer"].shape[0]) if observers is None else observers
     write_weather(scenario.weather, w, scenario.preset)
     mmsis = scenario.mmsis()
-    _write_own_ship(scenario, worlds, b, mmsis[OWN_SHIP])
-    for j, name in enumerate(scenario.ships, start=1):
+    if not agents:
+        _write_own_ship(scenario, worlds, b, mmsis[OWN_SHIP])
+    for j, name in enumerate(scenario.ships, start=first):
         write_ship(scenario, w, j, name, mmsis[name])
     for i, name in enumerate(scenario.obstacles):
         write_obstacle(scenario, w, i, name, mmsis[name])
@@ -150,6 +160,37 @@ def _write_own_ship(scenario: Scenario, worlds: Worlds, b: int, mmsi: int) -> No
     _write_station(v, 0, mmsi, _AIS[own.ais])
     if own.route:  # the start is waypoint 0, so that the first leg has a direction
         _write_route(scenario, w["routes"], 0, (own.position, *own.route), own.acceptance_radius, state.AFTER_STOP)
+
+
+def write_agent(
+    model: VesselModel,
+    worlds: Worlds,
+    b: int,
+    j: int,
+    route: Sequence[tuple[float, float]],
+    *,
+    preset: Preset = "standard",
+    acceptance_radius: float = 25.0,
+) -> None:
+    """Put a 3-DOF vessel with plant j and AIS class A into vessel slot j, at cruising speed along a route.
+
+    ``route`` are two or more places [north, east] of the origin [m]; the first is where it starts.
+    """
+    write_plant(model, worlds, b, j, preset=preset)
+    w: Any = worlds[b]
+    v, routes = w["vessels"], w["routes"]
+    v["kind"][j], v["model"][j], v["plant"][j] = state.KIND_USV, state.MODEL_3DOF, j
+    v["behaviour"][j], v["controlled"][j] = state.BEHAVIOUR_HOLD, 1
+    v["length"][j], v["beam"][j] = model.length, model.beam
+    heading = math.atan2(route[1][1] - route[0][1], route[1][0] - route[0][0])
+    _write_motion(v, j, route[0], heading, model.cruise_speed)
+    v["frame_eta"][j] = v["eta"][j]
+    _write_station(v, j, 257_900_001 + j, state.AIS_CLASS_A)
+    routes["waypoint"][j, : len(route)] = route
+    routes["count"][j], routes["leg"][j], routes["radius"][j] = len(route), 1, acceptance_radius
+    for o, slot in enumerate(w["observer"]):
+        if slot == j:
+            w["nav"]["leg"][o] = 1
 
 
 def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int) -> None:

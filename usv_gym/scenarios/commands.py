@@ -80,9 +80,11 @@ class Commands:
             raise ConfigError(f"spawn {id!r}: no free slot among {len(active)} {'vessels' if ship else 'obstacles'}")
         slot = int(free[0])
         source = slot if ship else V + slot
-        self._forget(source)
-        taken = set(self._w["vessels"]["mmsi"].tolist()) | set(self._w["obstacles"]["mmsi"].tolist())
         thing: Ship | Obstacle = one.ships[id] if ship else one.obstacles[id]
+        taken = {int(n) for g in ("vessels", "obstacles") for n in self._w[g]["mmsi"][self._w[g]["active"] != 0]}
+        if thing.mmsi in taken:
+            raise ConfigError(f"spawn {id!r}: mmsi {thing.mmsi} is taken")
+        self._forget(source)
         mmsi = thing.mmsi or next(n for n in range(257_000_001 if ship else 992_570_001, 1 << 30) if n not in taken)
         for column in (self._w["routes"], self._w["vessels"]) if ship else (self._w["obstacles"],):
             for name in column.dtype.names or ():

@@ -23,6 +23,7 @@ from ..world.state import (
     LIDAR,
     PHASE_MOTION,
     PHASE_NONE,
+    PHASE_POSITION,
     RADAR,
 )
 from .ais import ais_class, reporting_interval_us
@@ -37,8 +38,9 @@ def _timeout_us(w, o, s, sensor):
         return w.sensors.radar.timeout_us
     if sensor == LIDAR:
         return w.sensors.lidar.timeout_us
-    sog = w.ais.inbox[o, s, 4]
-    interval = reporting_interval_us(ais_class(w, s), sog if sog == sog else 0.0, 0.0, w.sensors.ais_interval_us)
+    # as slow as the station may be, given the error of its SOG: a moored one reports seldom, and not always 0
+    slowest = w.ais.inbox[o, s, 4] - 3.0 * math.hypot(w.sensors.ais_noise[4], w.sensors.ais_bias[4])
+    interval = reporting_interval_us(ais_class(w, s), max(slowest, 0.0), 0.0, w.sensors.ais_interval_us)
     return w.sensors.ais_timeout * interval
 
 
@@ -119,6 +121,9 @@ def take_scan(w, o, k, s, scan):
     if phase != PHASE_NONE and elapsed > scan.timeout_us:
         phase = PHASE_NONE
     fresh = phase == PHASE_NONE
+    if phase == PHASE_POSITION:
+        # f(d) at the range of the estimate: by their own, fixes that are too near count for more and pull the target nearer
+        f = max(scan.gain * math.hypot(x[0] - w.nav.position[o, 0], x[1] - w.nav.position[o, 1]), scan.gain_floor)
     t.phase[o, s, k + 1] = PHASE_NONE if fresh else phase
     started = False
     if phase != PHASE_MOTION:

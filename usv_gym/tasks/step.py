@@ -30,29 +30,36 @@ def distance_to_go(w, j):
 
 
 @spliced
-def begin_episode(w, task, episode):
-    """Reset world and episode memory."""
+def begin_episodes(w, tasks, episodes):
+    """Reset a world and what its observers remember of their episodes."""
     reset_world(w)
-    own = w.observer[0]
-    episode.step = 0
-    episode.to_go = distance_to_go(w, own)
-    episode.heading_ref = w.nav.mru_heading[0]
-    episode.speed_ref = max(w.nav.water_speed[0, 0], 0.0)
-    for c in range(episode.last_action.shape[0]):
-        episode.last_action[c] = 0.0
-    episode.closest = 1.0e9
-    episode.outcome = 0
+    for o in range(w.observer.shape[0]):
+        episode = episodes[o]
+        own = w.observer[o]
+        episode.step = 0
+        episode.to_go = distance_to_go(w, own)
+        episode.heading_ref = w.nav.mru_heading[o]
+        episode.speed_ref = w.vessels.nu[own, 0]
+        for c in range(episode.last_action.shape[0]):
+            episode.last_action[c] = 0.0
+        episode.closest = math.inf
+        episode.outcome = 0
+        episode.reward = 0.0
+        episode.terminated = episode.truncated = False
+        for i in range(episode.terms.shape[0]):
+            episode.terms[i] = 0.0
 
 
 @inner
-def _decode(w, task, episode, action):
-    """Turn an action into the references or commands of observer 0's plant; returns the squared change of the action."""
+def _decode(w, o, task, episode):
+    """Turn an action into the references or commands of observer o's plant; returns the squared change of the action."""
+    action = episode.action
     change = 0.0
     for c in range(task.channels):
         delta = action[c] - episode.last_action[c]
         change += delta * delta
         episode.last_action[c] = action[c]
-    p = w.vessels.plant[w.observer[0]]
+    p = w.vessels.plant[w.observer[o]]
     if task.action == ACTION_DEMAND:
         mix(w, p, clip(action[0], -1.0, 1.0), clip(action[1], -1.0, 1.0))
     elif task.action == ACTION_CHANNELS:
@@ -69,38 +76,32 @@ def _decode(w, task, episode, action):
         elif action[0] == 4.0:
             episode.speed_ref = max(episode.speed_ref - _FASTER * task.max_speed, 0.0)
     else:
-        episode.heading_ref = wrap(w.nav.mru_heading[0] + 0.5 * PI * clip(action[0], -1.0, 1.0))
+        episode.heading_ref = wrap(w.nav.mru_heading[o] + 0.5 * PI * clip(action[0], -1.0, 1.0))
         episode.speed_ref = 0.5 * (1.0 + clip(action[1], -1.0, 1.0)) * task.max_speed
     return change / task.channels
 
 
-@spliced
-def step_task(w, task, episode, action, rows, terms):
-    """One control step of a world.  Returns (reward, terminated, truncated) and fills terms."""
-    own = w.observer[0]
-    p = w.vessels.plant[own]
-    change = _decode(w, task, episode, action)
-    piloted = task.action != ACTION_DEMAND and task.action != ACTION_CHANNELS
-    w.safety.step_closest[0] = 1.0e9
-    had_collided, had_arrived = w.safety.collided_with[0] >= 0, w.routes.done[own] != 0
-    for k in range(task.control_ticks):
-        if piloted:
-            surge, yaw = autopilot(w, p, w.nav.mru_heading[0], w.nav.yaw_rate[0], w.nav.water_speed[0, 0],
-                                   episode.heading_ref, episode.speed_ref, w.dt)  # fmt: skip
-            mix(w, p, surge, yaw)
-        tick_world(w, rows, k)
-        if task.end_on_collision and w.safety.collided_with[0] >= 0:
-            break
-    move_traffic(w, w.tick)
-    episode.step += 1
-    closest = w.safety.step_closest[0]
-    episode.closest = min(episode.closest, closest)
+@inner
+def _pilot(w, o, task, episode):
+    """Let the autopilot of observer o's plant follow the references, from what it measures."""
+    p = w.vessels.plant[w.observer[o]]
+    surge, yaw = autopilot(w, p, w.nav.mru_heading[o], w.nav.yaw_rate[o], w.nav.water_speed[o, 0],
+                           episode.heading_ref, episode.speed_ref, w.dt)  # fmt: skip
+    mix(w, p, surge, yaw)
 
+
+@inner
+def _judge(w, o, task, episode):
+    """Terms, reward and end of the step that observer o has just made, from truth."""
+    own = w.observer[o]
+    r, terms = w.routes, episode.terms
+    episode.step += 1
+    closest = w.safety.step_closest[o]
+    episode.closest = min(episode.closest, closest)
     to_go = distance_to_go(w, own)
     terms[0] = (episode.to_go - to_go) / (task.max_speed * task.control_ticks * w.dt)
     episode.to_go = to_go
     terms[1] = 0.0
-    r = w.routes
     k = r.leg[own]
     if 0 < k < r.count[own]:
         error = cross_track_error(r.waypoint[own, k - 1, 0], r.waypoint[own, k - 1, 1], r.waypoint[own, k, 0],
@@ -108,63 +109,101 @@ def step_task(w, task, episode, action, rows, terms):
         terms[1] = -min(abs(error) / task.cross_track_scale, 1.0)
     intrusion = clip(1.0 - closest / task.safe_distance, 0.0, 1.0)
     terms[2] = -intrusion * intrusion
-    terms[3] = -change
+    terms[3] = -episode.change
     terms[4] = -1.0
-    collision = w.safety.collided_with[0] >= 0
+    collision = w.safety.collided_with[o] >= 0
     arrival = r.count[own] > 0 and r.done[own] != 0
     half = w.area[0]
     outside = half > 0.0 and (abs(w.vessels.eta[own, 0]) > half or abs(w.vessels.eta[own, 1]) > half)
-    terms[5] = -1.0 if collision and not had_collided else 0.0
-    terms[6] = 1.0 if arrival and not had_arrived and not collision else 0.0
+    terms[5] = -1.0 if collision and episode.collided == 0 else 0.0
+    terms[6] = 1.0 if arrival and episode.arrived == 0 and not collision else 0.0
     terms[7] = -1.0 if outside else 0.0
-    reward = 0.0
+    episode.reward = 0.0
     for i in range(terms.shape[0]):
-        reward += task.weight[i] * terms[i]
+        episode.reward += task.weight[i] * terms[i]
     terminated = (
         (collision and task.end_on_collision) or (arrival and task.end_on_arrival) or (outside and task.end_out_of_area)
     )
     truncated = not terminated and task.max_steps > 0 and episode.step >= task.max_steps
     if terminated or truncated:
         episode.outcome = 1 if collision else (2 if arrival else (3 if outside else 4))
-    return reward, terminated, truncated
+    episode.terminated = terminated
+    episode.truncated = truncated
+
+
+@spliced
+def step_task(w, tasks, episodes, rows):
+    """One control step of a world: every observer's action, the ticks, every observer's judgement.
+
+    Observers whose vessel has left the sea do nothing.  A lone observer's step ends where its vessel collides.
+    """
+    O = w.observer.shape[0]
+    piloted = tasks[0].action != ACTION_DEMAND and tasks[0].action != ACTION_CHANNELS
+    for o in range(O):
+        own = w.observer[o]
+        w.safety.step_closest[o] = math.inf
+        episodes[o].collided = w.safety.collided_with[o] >= 0
+        episodes[o].arrived = w.routes.done[own] != 0
+        if w.vessels.active[own]:
+            episodes[o].change = _decode(w, o, tasks[o], episodes[o])
+    for k in range(tasks[0].control_ticks):
+        if piloted:
+            for o in range(O):
+                if w.vessels.active[w.observer[o]]:
+                    _pilot(w, o, tasks[o], episodes[o])
+        tick_world(w, rows, k)
+        if O == 1 and tasks[0].end_on_collision and w.safety.collided_with[0] >= 0:
+            break
+    move_traffic(w, w.tick)
+    for o in range(O):
+        if w.vessels.active[w.observer[o]]:
+            _judge(w, o, tasks[o], episodes[o])
 
 
 BEGIN, STEP = 1, 2  #: what ``run_batch`` does with a row
 
 
-@kernel
-def run_batch(worlds, task, episodes, what, actions, rows, obs, terms, reward, terminated, truncated):
-    """Begin an episode in the rows where ``what`` [B] is BEGIN, make a control step where it is STEP, leave the others.
+@inner
+def _possible(task, action):
+    """True if an action can be carried out."""
+    for c in range(task.channels):
+        if not math.isfinite(action[c]):
+            return False
+    if task.action == ACTION_DISCRETE:
+        return action[0] == math.floor(action[0]) and 0.0 <= action[0] < 5.0
+    return True
 
-    worlds [B], task [1], episodes [B], actions [B, n] float64, rows [ticks, n, A, 3] (see engine.advance_worlds),
-    obs [B, size] float32, terms [B, N_TERMS], reward [B], terminated [B], truncated [B]; the last five are written.
-    Returns -1, or the first row whose action is not finite or none of ``discrete``; then nothing at all has moved.  (One
-    entry point for both, because what they share is then compiled once.)
+
+@kernel
+def run_batch(worlds, tasks, episodes, obs, rows):
+    """Begin an episode in the rows that ask for BEGIN, make a control step in those that ask for STEP, leave the others.
+
+    worlds [B]; tasks [O], one per observer; episodes [B, O] with ``what`` (of observer 0) and ``action`` as input and the
+    rest as result; obs [B, O, size] float32, written; rows [ticks, n, A, 3] (see engine.advance_worlds).
+    Returns -1, or the first row with an action that is not finite or none of ``discrete``; then nothing at all has moved.
+    (One entry point for both, because what they share is then compiled once.)
     """
+    O = episodes.shape[1]
     for b in range(worlds.shape[0]):
-        if what[b] == STEP:
-            for c in range(actions.shape[1]):
-                a = actions[b, c]
-                if not math.isfinite(a) or (task[0].action == ACTION_DISCRETE and not (a == math.floor(a) and 0.0 <= a < 5.0)):
+        if episodes[b, 0].what == STEP:
+            for o in range(O):
+                if worlds[b].vessels.active[worlds[b].observer[o]] and not _possible(tasks[o], episodes[b, o].action):
                     return b
     for b in range(worlds.shape[0]):
-        if what[b] == BEGIN:
-            begin_episode(worlds[b], task[0], episodes[b])
-            reward[b] = 0.0
-            terminated[b] = truncated[b] = False
-            for i in range(terms.shape[1]):
-                terms[b, i] = 0.0
-        elif what[b] == STEP:
-            reward[b], terminated[b], truncated[b] = step_task(
-                worlds[b], task[0], episodes[b], actions[b], rows, terms[b]
-            )
-        if what[b] != 0:
-            observe(worlds[b], 0, task[0], obs[b])
+        what = episodes[b, 0].what
+        if what == BEGIN:
+            begin_episodes(worlds[b], tasks, episodes[b])
+        elif what == STEP:
+            step_task(worlds[b], tasks, episodes[b], rows)
+        if what != 0:
+            for o in range(O):
+                observe(worlds[b], o, tasks[o], obs[b, o])
     return -1
 
 
 @kernel
-def observe_batch(worlds, task, obs):
-    """Write the observation [B, size] that the records hold now; reads nothing but navigation and picture."""
+def observe_batch(worlds, tasks, obs):
+    """Write the observations [B, O, size] that the records hold now; reads nothing but navigation and picture."""
     for b in range(worlds.shape[0]):
-        observe(worlds[b], 0, task[0], obs[b])
+        for o in range(worlds[b].observer.shape[0]):
+            observe(worlds[b], o, tasks[o], obs[b, o])

@@ -115,11 +115,14 @@ def task_dtype() -> np.dtype[Any]:
 
 @functools.cache
 def episode_dtype() -> np.dtype[Any]:
-    """dtype of what a task remembers of a running episode, one per world."""
+    """dtype of what passes between face and kernel, and of what a task remembers of an episode: one per observer."""
     return np.dtype([
+        ("what", "i1"), ("action", "f8", (3 * A,)),  # in: tasks/step.py, BEGIN or STEP; channels of the action
+        ("reward", "f8"), ("terms", "f8", (N_TERMS,)), ("terminated", "?"), ("truncated", "?"),  # out
         ("step", "i8"), ("to_go", "f8"),  # steps so far; distance to go along the route [m]
         ("heading_ref", "f8"), ("speed_ref", "f8"),  # of heading_speed and discrete
-        ("last_action", "f8", (3 * A,)),
+        ("last_action", "f8", (3 * A,)), ("change", "f8"),  # mean squared change of the action in this step
+        ("collided", "i1"), ("arrived", "i1"),  # before this step
         ("closest", "f8"),  # smallest hull distance to anything since reset [m]
         ("outcome", "i1"),  # 0 running, 1 collision, 2 arrival, 3 out of area, 4 time limit
     ], align=True)  # fmt: skip

@@ -1,0 +1,90 @@
+"""How fast ``rgb_array`` is: 800 x 800 pixels of a crowded sea, on one core.
+
+    python benchmarks/map.py
+
+Sixteen ships and 32 obstacles within 440 m, all of them detected, with trails, covariances, AIS, shadows and labels: the worst
+case of a map.  One frame is a scene made from the record and drawn; times are of the processor, so that a busy machine
+disturbs little.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from typing import Any
+
+import numpy as np
+
+from usv_gym.render.pygame_view import render
+from usv_gym.render.scene import History, scene_from_snapshot
+from usv_gym.world import state
+
+V, M, SHIPS, OBSTACLES = 20, 40, 16, 32
+WARM, FRAMES = 120, 120
+
+
+def crowded_sea() -> Any:
+    """The record."""
+    rng = np.random.default_rng(3)
+    w = np.zeros(1, state.world_dtype(V, M))[0]
+    w["dt_us"], w["dt"] = 50_000, 0.05
+    v, m, p, sensors = w["vessels"], w["obstacles"], w["picture"], w["sensors"]
+    n = SHIPS + 1
+    v["plant"] = -1
+    v["active"][:n], v["kind"][1:n], v["kind"][0] = 1, rng.integers(0, 3, SHIPS), state.KIND_USV
+    v["length"][:n] = rng.uniform(20.0, 90.0, n)
+    v["length"][0] = 10.9
+    v["beam"] = v["length"] / 6.0
+    v["eta"][1:n, :2], v["eta"][:n, 2] = rng.uniform(-440.0, 440.0, (SHIPS, 2)), rng.uniform(-3.0, 3.0, n)
+    v["nu"][:n, 0] = speed = rng.uniform(1.0, 8.0, n)
+    psi = v["eta"][:n, 2]
+    v["velocity"][:n] = speed[:, None] * np.column_stack((np.cos(psi), np.sin(psi)))
+    m["active"][:OBSTACLES], m["kind"][:OBSTACLES] = 1, rng.choice([10, 10, 10, 11, 12, 13, 14], OBSTACLES)
+    m["radius"][:OBSTACLES] = rng.uniform(4.0, 30.0, OBSTACLES)
+    m["position"][:OBSTACLES] = rng.uniform(-440.0, 440.0, (OBSTACLES, 2))
+    route = w["routes"]
+    route["waypoint"][0, :5], route["count"][0], route["radius"][0] = rng.uniform(-400.0, 400.0, (5, 2)), 5, 20.0
+    sensors["exteroceptive"] = sensors["radar"]["on"] = sensors["lidar"]["on"] = 1
+    sensors["radar"]["range"], sensors["lidar"]["range"] = 1852.0, 120.0
+    for source in (*range(1, n), *range(V, V + OBSTACLES)):
+        ship = source < V
+        p["id"][0, source], p["sensors"][0, source] = source, rng.integers(1, 8)
+        p["descriptor"][0, source], p["motion_known"][0, source] = ship, 1
+        p["cog"][0, source], p["sog"][0, source] = (psi[source], speed[source]) if ship else (np.nan, np.nan)
+        p["radius"][0, source] = 0.5 * v["length"][source] if ship else m["radius"][source - V]
+        p["covariance"][0, source] = 60.0, 20.0, 40.0, 0.0, 0.0
+    w["ais"]["received"][0, 1:n], w["ais"]["heading"][1:n] = 1, psi[1:]
+    w["safety"]["distance"][0] = 200.0
+    advance(w)
+    return w
+
+
+def advance(w: Any, seconds: float = 0.5) -> None:
+    """Half a second later: ships and what is known of them have moved on."""
+    v, p = w["vessels"], w["picture"]
+    w["tick"] += round(seconds / 0.05)
+    v["eta"][:, :2] += seconds * v["velocity"]
+    places = np.concatenate((v["eta"][:, :2], w["obstacles"]["position"]))
+    p["position"][0] = places + np.array((4.0, -3.0))
+    w["ais"]["position"] = places + np.array((3.0, 3.0))
+
+
+def main() -> None:
+    """Print median and best frame."""
+    w, history, times = crowded_sea(), History(), []
+    for _ in range(WARM + FRAMES):
+        advance(w)
+        began = time.process_time()
+        render(scene_from_snapshot(w, [], history), (800, 800))
+        times.append(time.process_time() - began)
+        if w["tick"] > 1200:  # everything stays in sight
+            w["vessels"]["eta"][:, :2] -= 60.0 * w["vessels"]["velocity"]
+            w["tick"] = 0
+    times = times[WARM:]
+    middle, best = statistics.median(times), min(times)
+    print(f"{SHIPS} ships, {OBSTACLES} obstacles, 800 x 800: median {1e3 * middle:.1f} ms ({1.0 / middle:.0f} frames/s), "
+          f"best {1e3 * best:.1f} ms ({1.0 / best:.0f} frames/s)")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
