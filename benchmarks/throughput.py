@@ -74,8 +74,8 @@ def starting() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as cache, tempfile.TemporaryDirectory() as out:
         cold = float(child(make, USV_GYM_CACHE=cache)[1])
         warm = float(child(make, USV_GYM_CACHE=cache)[1])
-        run = ("import sys; from usv_gym.cli import main; "
-               f"sys.argv = ['usv-gym', 'run', 'busy_open_sea', '--policy', 'thrust-log', '--quiet', '--out', {out!r}]; main()")  # fmt: skip
+        arguments = ["usv-gym", "run", "busy_open_sea", "--policy", "thrust-log", "--quiet", "--out", out]
+        run = f"import sys; from usv_gym.cli import main; sys.argv = {arguments!r}; main()"
         runs = [child(run, USV_GYM_CACHE=cache)[0] for _ in range(3)]
     return {"import_s": min(imports), "cold_compile_s": cold, "warm_first_step_s": warm, "warm_run_s": min(runs)}
 

@@ -1,6 +1,7 @@
 """The 3-D replay: small, self-contained, true to the episode, and alive in a browser."""
 
 import base64
+import dataclasses
 import functools
 import hashlib
 import io
@@ -20,7 +21,7 @@ from typer.testing import CliRunner
 
 from usv_gym.cli import app
 from usv_gym.replay import html
-from usv_gym.replay.archive import save
+from usv_gym.replay.archive import sample_dtype, save
 from usv_gym.replay.html import QUANTUM, pack, unpack, write_replay
 from usv_gym.replay.recorder import Recorder
 
@@ -119,6 +120,23 @@ def test_thrust_is_a_share_of_the_largest_and_has_a_side():
     # 1200 of 2000 rpm, but the bucket stands in the middle
     assert columns["thrust_x"].shape == (3, 21)
     assert np.all(columns["thrust_x"][:2] == 0.0)
+
+
+def test_any_episode_can_be_packed():
+    """One sample; a vessel file that is not known here; no AIS, no detections."""
+    e = episode(20)
+    one = dataclasses.replace(
+        e,
+        meta={**e.meta, "vessel": "elsewhere", "sensors": {}, "waypoints": []},
+        detections=e.detections[:0],
+        ais=e.ais[:0],
+        **{name: getattr(e, name)[:1] for name in sample_dtype(8, 16).names},
+    )
+    header, columns = unpack(pack(one))
+    assert header["thrusters"] == []
+    assert columns["t"].tolist() == [[0.0]]
+    assert columns["thrust_x"].shape == (0, 1)
+    assert columns["d_t"].shape == (1, 0)
 
 
 def test_pieces_make_the_whole():
@@ -428,8 +446,10 @@ def test_live_streams_and_a_click_puts_an_obstacle_into_the_sea(broadcast, reque
         assert browser.complaints == []
     on_air.stop()
     sailing.join(60)
+    stream_text = stream.read()
+    stream.close()
     parts, events = [], []
-    for line in stream:
+    for line in stream_text.splitlines():
         if line.startswith((b"data: eJ", b"data: eN")):
             header, columns = unpack(base64.b64decode(line[6:]))
             parts.append(columns["t"][0])

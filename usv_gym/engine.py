@@ -49,6 +49,8 @@ def tick_world(w, rows, row):
     if tick - w.frame_tick >= w.frame_ticks:
         end_frame(w)
     if tick >= w.next_nav:
+        if w.vessels.model[w.observer[0]] != MODEL_3DOF:
+            move_traffic(w, tick)  # a kinematic observer is where the traffic is
         navigate(w, tick)
     if tick >= w.next_sense:
         move_traffic(w, tick)

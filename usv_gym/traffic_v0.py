@@ -1,6 +1,6 @@
 """PettingZoo's conventional module: ``from usv_gym import traffic_v0; env = traffic_v0.parallel_env(agents=4)``.
 
-Needs the extra ``pettingzoo``.  Importing it also registers ``usv_gym/traffic_v0`` with PettingZoo's registry, where there is one.
+Needs the extra ``pettingzoo``.  Importing it also registers ``usv_gym/traffic_v0`` with PettingZoo's registry, if it has one.
 """
 
 from __future__ import annotations

@@ -56,20 +56,20 @@ class Environment(TaskConfig):
 class PPO(Network):
     """Hyperparameters of proximal policy optimisation.
 
-    The defaults suit about a million steps: long rollouts of many worlds, large batches and a network small enough for a CPU.
+    The defaults suit about a million steps: rollouts of many worlds, large batches and a network small enough for a CPU.
     """
 
     n_steps: int = Field(default=128, ge=2)  #: steps of each world between two updates
-    batch_size: int = Field(default=1024, ge=2)
-    n_epochs: int = Field(default=8, ge=1)
-    learning_rate: float = Field(default=5e-4, gt=0)  #: at the start; falls to a tenth in a straight line
-    gamma: float = Field(default=0.99, gt=0, le=1)
+    batch_size: int = Field(default=2048, ge=2)
+    n_epochs: int = Field(default=6, ge=1)
+    learning_rate: float = Field(default=1e-3, gt=0)  #: at the start; falls to a tenth in a straight line
+    gamma: float = Field(default=0.97, gt=0, le=1)  #: a collision counts about half a minute ahead
     gae_lambda: float = Field(default=0.95, ge=0, le=1)
     clip_range: float = Field(default=0.2, gt=0)
     ent_coef: float = Field(default=0.0, ge=0)
     vf_coef: float = Field(default=0.5, ge=0)
     max_grad_norm: float = Field(default=0.5, gt=0)
-    log_std_init: float = -0.5  #: of the actions at the start
+    log_std_init: float = -1.0  #: of the actions at the start
     reward_scale: float = Field(default=0.1, gt=0)  #: on the rewards that PPO sees, so that values are of order 1
 
 
@@ -216,7 +216,7 @@ def train(
     done = int(model.num_timesteps)
     env.seed(training.seed if not done else training.seed + done % (HELD_OUT - training.seed - training.envs))
     core = env.env.core
-    shape = Network(layers=training.ppo.layers, activation=training.ppo.activation)
+    shape = Network(**{key: getattr(training.ppo, key) for key in Network.model_fields})
     meta = {"training": training.dump(), "task": core.config.dump(), "network": shape.dump(), "scales": core.scales()}
 
     def save(path: Path) -> None:
@@ -282,7 +282,7 @@ def _model(training: Training, env: Any) -> Any:
         env,
         batch_size=min(ppo.batch_size, ppo.n_steps * training.envs),
         learning_rate=lambda left: rate * (0.1 + 0.9 * left),
-        policy_kwargs={**ppo.arguments(), "log_std_init": ppo.log_std_init},
+        policy_kwargs={**ppo.arguments(training.env), "log_std_init": ppo.log_std_init},
         seed=training.seed,
         device="cpu",
         **{key: getattr(ppo, key) for key in same},

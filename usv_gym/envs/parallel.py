@@ -104,7 +104,9 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self._models: list[VesselModel] = [load_vessel(vessels[k % len(vessels)]) for k in range(agents)]
         facts = [vessel_facts(model) for model in self._models]
         self.configs = [config.model_copy(update={"action": resolve_action(config, f)}) for f in facts]
-        self.observation_spaces = {agent: observation_space(c) for agent, c in zip(self.possible_agents, self.configs, strict=True)}
+        self.observation_spaces = {
+            agent: observation_space(c) for agent, c in zip(self.possible_agents, self.configs, strict=True)
+        }
         self.action_spaces = {
             agent: action_space(c, f) for agent, c, f in zip(self.possible_agents, self.configs, facts, strict=True)
         }
@@ -191,7 +193,8 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         psi = v["eta"][:, 2]
         vessels = np.column_stack([v["active"], v["eta"][:, :2], np.sin(psi), np.cos(psi), v["nu"]])
         obstacles = np.column_stack([m["active"], m["position"], m["radius"]])
-        return np.concatenate([(vessels * v["active"][:, None]).ravel(), (obstacles * m["active"][:, None]).ravel()]).astype(np.float32)
+        there = (vessels * v["active"][:, None]).ravel(), (obstacles * m["active"][:, None]).ravel()
+        return np.concatenate(there).astype(np.float32)
 
     def render(self) -> NDArray[np.uint8] | None:
         """The map around the first agent that is left, [H, W, 3]."""

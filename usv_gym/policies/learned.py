@@ -29,15 +29,22 @@ FORMAT, VERSION, MEMBER = "usv-policy", 1, "usv_gym.json"
 
 
 class Network(Model):
-    """Two perceptrons of this shape, one for the actions and one for their value."""
+    """Two perceptrons of this shape, one for the actions and one for their value, behind a common look at the targets."""
 
-    layers: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = Field(default=(128, 128), max_length=8)
+    layers: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = Field(default=(64, 64), max_length=8)
     activation: Literal["tanh", "relu"] = "tanh"
+    encoder: int = Field(default=64, ge=0, le=4096)  #: width of what looks at each target; 0: none
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self, task: TaskConfig) -> dict[str, Any]:
         """The ``policy_kwargs`` of stable-baselines3."""
         nn = _torch().nn
-        return {"net_arch": list(self.layers), "activation_fn": nn.Tanh if self.activation == "tanh" else nn.ReLU}
+        arguments = {"net_arch": list(self.layers), "activation_fn": nn.Tanh if self.activation == "tanh" else nn.ReLU}
+        if not self.encoder or task.observation == "sectors":
+            return arguments
+        from .networks import TargetEncoder
+
+        look = {"width": self.encoder, "range_scale": task.range_scale}
+        return {**arguments, "features_extractor_class": TargetEncoder, "features_extractor_kwargs": look}
 
 
 class LearnedPolicy:
@@ -214,7 +221,7 @@ def load_policy(path: str | Path, *, trust: bool = False) -> LearnedPolicy:
     shape = validate(Network, Document(f"policy {path}", dict(meta["network"])))
     actions = gym.spaces.Discrete(len(DISCRETE)) if task.action == "discrete" else gym.spaces.Box(
         -1.0, 1.0, (meta["scales"]["channels"],), np.float32)  # fmt: skip
-    network = kind(observation_space(task), actions, lambda _: 0.0, **shape.arguments())
+    network = kind(observation_space(task), actions, lambda _: 0.0, **shape.arguments(task))
     weights = read_tensors(path, "policy.pth")
     try:
         network.load_state_dict(weights)

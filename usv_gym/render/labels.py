@@ -17,12 +17,20 @@ Boxes = NDArray[np.float64]
 
 GAP = 3.0  #: [px] between an object and its label
 LEADER = 14.0  #: [px] a label further from its object than this gets a line to it
-#: right and left first, as people expect; then the corners, above and below (x, y), y down
-_ANGLES = np.radians([0, 180, 45, -45, 135, -135, 90, -90, 20, -20, 160, -160])
-_DIRECTIONS = np.column_stack((np.cos(_ANGLES), np.sin(_ANGLES)))
-_PREFERENCE = np.array([0.0, 1.5, 1.0, 1.0, 2.5, 2.5, 3.0, 3.0, 0.8, 0.8, 2.0, 2.0])
-_OUTWARD = np.clip(1.5 * _DIRECTIONS, -1.0, 1.0)
+#: right and left first, as people expect; then the corners, above and below: angle [deg], y down, and what it costs
+_ANGLES = ((0, 0.0), (180, 1.5), (45, 1.0), (-45, 1.0), (135, 2.5), (-135, 2.5), (90, 3.0), (-90, 3.0), (20, 0.8),
+           (-20, 0.8), (160, 2.0), (-160, 2.0))  # fmt: skip
 _DISTANCES = (0.0, 7.0, 16.0, 28.0, 44.0, 64.0, 90.0)
+
+
+def _candidate(angle: float, price: float, distance: float) -> tuple[float, ...]:
+    x, y = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    out_x, out_y = (min(max(1.5 * k, -1.0), 1.0) for k in (x, y))
+    return price + 0.45 * distance, distance, x, y, out_x, out_y
+
+
+#: cheapest first: price, distance [px], direction, and how far the box goes that way, in halves of its size
+_CANDIDATES = sorted(_candidate(angle, price, d) for angle, price in _ANGLES for d in _DISTANCES)
 
 
 @dataclass(frozen=True)
@@ -88,44 +96,48 @@ def place(
 
 
 def _best(request: Request, frame: Box, hard: Boxes, soft: Boxes) -> Box | None:
-    """The cheapest free box, looking further away only while that could be cheaper."""
+    """The cheapest free box.  Plain numbers: the first few candidates are good enough nearly always."""
     (w, h), (x, y) = request.size, request.anchor
-    half = np.array((0.5 * w, 0.5 * h))
+    reach = 0.0 if request.fixed else request.clearance + GAP + min(request.far, _DISTANCES[-1])
+    around = (x - reach - w, y - reach - h, x + reach + w, y + reach + h)
+    taken, bodies = _touching(hard, around), _touching(soft, around)
     if request.fixed:
         box = (x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h)
-        free = _inside(np.array([box]), frame)[0] and not _overlap(np.array([box]), np.vstack((hard, soft))).any()
-        return box if free else None
+        return box if _inside(box, frame) and not any(_shared(box, other) for other in (*taken, *bodies)) else None
     best, cheapest = None, math.inf
-    for distance in _DISTANCES:
-        if distance > request.far or 0.45 * distance >= cheapest:
+    for price, distance, dx, dy, out_x, out_y in _CANDIDATES:
+        if price >= cheapest:
             break
-        # a box touches the circle of `reach`: its centre is further out by its own half extent in that direction
-        reach = request.clearance + GAP + distance
-        centres = (x, y) + reach * _DIRECTIONS + half * _OUTWARD
-        boxes = np.hstack((centres - half, centres + half))
-        free = _inside(boxes, frame) & (_overlap(boxes, hard).sum(axis=1) == 0.0)
-        if not free.any():
+        if distance > request.far:
             continue
-        covered = _overlap(boxes, soft).sum(axis=1) / (w * h)
-        cost = np.where(free, 0.45 * distance + _PREFERENCE + 60.0 * covered, math.inf)
-        k = int(cost.argmin())
-        if cost[k] < cheapest:
-            best, cheapest = boxes[k], float(cost[k])
-    return None if best is None else tuple(best.tolist())
+        # the box touches the circle of `r`: its centre is further out by its own half extent in that direction
+        r = request.clearance + GAP + distance
+        left, top = x + r * dx + 0.5 * w * (out_x - 1.0), y + r * dy + 0.5 * h * (out_y - 1.0)
+        box = (left, top, left + w, top + h)
+        if _inside(box, frame) and not any(_shared(box, other) for other in taken):
+            cost = price + 60.0 * sum(_shared(box, other) for other in bodies) / (w * h)
+            if cost < cheapest:
+                best, cheapest = box, cost
+    return best
 
 
-def _inside(boxes: Boxes, frame: Box) -> NDArray[np.bool_]:
-    """Which boxes [n, 4] lie in the frame."""
-    inside = (boxes[:, :2] >= frame[:2]) & (boxes[:, 2:] <= frame[2:])
-    return np.asarray(inside.all(axis=1))
+def _touching(boxes: Boxes, around: Box) -> list[Box]:
+    """Those of boxes [n, 4] that overlap one."""
+    x0, y0, x1, y1 = around
+    touching = (boxes[:, 0] < x1) & (boxes[:, 1] < y1) & (boxes[:, 2] > x0) & (boxes[:, 3] > y0)
+    found: list[Box] = boxes[touching].tolist()
+    return found
 
 
-def _overlap(boxes: Boxes, others: Boxes) -> NDArray[np.float64]:
-    """Shared areas [n, m]."""
-    width = np.minimum(boxes[:, None, 2], others[None, :, 2]) - np.maximum(boxes[:, None, 0], others[None, :, 0])
-    height = np.minimum(boxes[:, None, 3], others[None, :, 3]) - np.maximum(boxes[:, None, 1], others[None, :, 1])
-    shared: NDArray[np.float64] = np.maximum(width, 0.0) * np.maximum(height, 0.0)
-    return shared
+def _inside(box: Box, frame: Box) -> bool:
+    return box[0] >= frame[0] and box[1] >= frame[1] and box[2] <= frame[2] and box[3] <= frame[3]
+
+
+def _shared(a: Box, b: Box) -> float:
+    """Area that two boxes share."""
+    width = (a[2] if a[2] < b[2] else b[2]) - (a[0] if a[0] > b[0] else b[0])
+    height = (a[3] if a[3] < b[3] else b[3]) - (a[1] if a[1] > b[1] else b[1])
+    return width * height if width > 0.0 and height > 0.0 else 0.0
 
 
 def _leader(request: Request, box: Box) -> tuple[tuple[float, float], tuple[float, float]] | None:

@@ -94,7 +94,7 @@ STYLES: dict[str, Style] = {
     "detection":      _style("#f28c1e50 #d97514", "#f28c1e55 #ffa64d", "#8a3f1050 #b05820", 1.1),
     "detection_vector": _style("- #d4670a",       "- #ffa64d",         "- #b05820", 1.4, (5, 3)),
     "detection_past": _style("#e0761038 -",       "#f28c1e48 -",       "#8a3f1060 -"),
-    "covariance":     _style("- #b236b8",         "- #e08cf0",         "- #a8584e", 1.1, (4, 2)),
+    "covariance":     _style("- #b236b8",         "- #e08cf0",         "- #a8584e", 0.9),
     "ais":            _style("- #0a6f6c",         "- #56d6ce",         "- #a58c38", 1.4),
     # verdicts
     "cpa":            _style("- #c01843",         "- #ff5c83",         "- #b03028", 1.4, (2, 2)),

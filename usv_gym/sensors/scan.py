@@ -34,26 +34,10 @@ def deliver(w, o, k, tick):
 
 
 @inner
-def _error(w, o, k, s, tick, noise, bias, bias_time, stream_bias, stream_noise):
-    """Error (N, E, radius) of a scan at f(d) = 1: drifting bias plus white noise."""
-    t = w.tracks
-    slot = 2 * pair_slot(w, o, s)
-    b0, b1 = rng.normal2(w.seed, stream_bias, slot, tick)
-    b2, n2 = rng.normal2(w.seed, stream_bias, slot + 1, tick)
-    n0, n1 = rng.normal2(w.seed, stream_noise, slot, tick)
-    b = t.scan_bias[o, k, s]
-    now = tick * w.dt_us
-    seconds = (now - t.scan_bias_us[o, k, s]) * 1.0e-6
-    fresh = t.scan_bias_us[o, k, s] < 0
-    t.scan_bias_us[o, k, s] = now
-    a0 = 0.0 if fresh or bias_time[0] <= 0.0 else math.exp(-seconds / bias_time[0])
-    a1 = 0.0 if fresh or bias_time[1] <= 0.0 else math.exp(-seconds / bias_time[1])
-    g0 = bias[0] * math.sqrt(1.0 - a0 * a0)
-    g1 = bias[1] * math.sqrt(1.0 - a1 * a1)
-    b[0] = a0 * b[0] + g0 * b0
-    b[1] = a0 * b[1] + g0 * b1
-    b[2] = a1 * b[2] + g1 * b2
-    return b[0] + noise[0] * n0, b[1] + noise[0] * n1, b[2] + noise[1] * n2
+def _decay(bias, bias_time, seconds):
+    """Share of a bias [m] that is left after so long, and standard deviation of what is new."""
+    a = math.exp(-seconds / bias_time) if seconds >= 0.0 and bias_time > 0.0 else 0.0
+    return a, bias * math.sqrt(1.0 - a * a)
 
 
 @inner
@@ -68,6 +52,9 @@ def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detect
     count = look_around(w, own, reach)
     cast_shadows(w, count)
     V = w.vessels.active.shape[0]
+    now = tick * w.dt_us
+    before = now + 1  # when the last source's bias was drawn: nearly all were in the same scan
+    a0 = g0 = a1 = g1 = 0.0
     for i in range(count):
         s = w.order[i]
         if w.hidden[s]:
@@ -82,7 +69,21 @@ def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detect
             detection *= shown * shown / (shown * shown + sensor.detection_radius * sensor.detection_radius)
         if detection < 1.0 and rng.uniform(w.seed, stream_detection, pair_slot(w, o, s), tick) >= detection:
             continue
-        en, ee, er = _error(w, o, k, s, tick, sensor.noise, sensor.bias, sensor.bias_time, stream_bias, stream_noise)
+        if t.scan_bias_us[o, k, s] != before:
+            before = t.scan_bias_us[o, k, s]
+            seconds = (now - before) * 1.0e-6 if before >= 0 else -1.0
+            a0, g0 = _decay(sensor.bias[0], sensor.bias_time[0], seconds)
+            a1, g1 = _decay(sensor.bias[1], sensor.bias_time[1], seconds)
+        t.scan_bias_us[o, k, s] = now
+        slot = 2 * pair_slot(w, o, s)
+        b0, b1 = rng.normal2(w.seed, stream_bias, slot, tick)
+        b2, n2 = rng.normal2(w.seed, stream_bias, slot + 1, tick)
+        n0, n1 = rng.normal2(w.seed, stream_noise, slot, tick)
+        b = t.scan_bias[o, k, s]
+        b[0] = a0 * b[0] + g0 * b0
+        b[1] = a0 * b[1] + g0 * b1
+        b[2] = a1 * b[2] + g1 * b2
+        en, ee, er = b[0] + sensor.noise[0] * n0, b[1] + sensor.noise[0] * n1, b[2] + sensor.noise[1] * n2
         f = sensor.gain * d
         if s < V:
             dn = w.vessels.eta[s, 0] - w.vessels.eta[own, 0]
@@ -99,8 +100,8 @@ def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detect
         t.measured[o, k, s, 2] = max(radius + f * er, w.sensors.radius_min)
         # the controller's side knows the measured range only
         t.measured[o, k, s, 3] = max(sensor.gain * math.hypot(dn, de), sensor.gain_floor)
-        t.measured_us[o, k, s] = tick * w.dt_us
-    t.scan_us[o, k] = tick * w.dt_us
+        t.measured_us[o, k, s] = now
+    t.scan_us[o, k] = now
     t.scan_due[o, k] = tick + sensor.latency_us // w.dt_us
 
 

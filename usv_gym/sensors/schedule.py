@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..jit import inner, spliced
-from .ais import NEVER, next_fire, schedule, transmit
+from .ais import NEVER, next_fire, schedule, transmit, transmits
 from .scan import deliver, scan_lidar, scan_radar
 from .tdm import publish, take_ais
 
@@ -63,7 +63,10 @@ def sense(w, tick):
         if not make_room:
             for s in range(S):
                 if tick >= w.ais.next_tick[s]:
-                    transmit(w, s, tick)
+                    if transmits(w, s):
+                        transmit(w, s, tick)
+                    else:  # it has left the sea, or its station is off
+                        w.ais.next_tick[s] = NEVER
         for o in range(w.observer.shape[0]):
             if w.vessels.active[w.observer[o]] == 0:
                 continue

@@ -67,7 +67,7 @@ def sweep(w):
         j = w.observer[o]
         if v.active[j] == 0:
             continue
-        n1, e1, p1 = v.frame_eta[j, 0], v.frame_eta[j, 1], v.frame_eta[j, 2]
+        n1, e1 = v.frame_eta[j, 0], v.frame_eta[j, 1]
         dn1, de1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1
         l1, b1 = v.length[j], v.beam[j]
         s1, c1 = sincos(v.eta[j, 2])

@@ -70,7 +70,7 @@ export class Episode {
       if (rows) {
         for (let i = 0; i < column.count; i++) (rows[i] ??= {})[name.slice(2)] = column.values[i];
       } else if (name === "t") {
-        this.t.push(...column.values);
+        for (const t of column.values) this.t.push(t);
       } else {
         (this.series[name] ??= new Series(column.rows)).append(column);
       }
@@ -131,7 +131,7 @@ export class Episode {
   /** Targets of the TDM that were current at t. */
   targets(t) {
     const k = upper(this.reports, t + 1e-6, (r) => r.t) - 1;
-    const patience = Math.max(5, 4 * this.header.tdm_period, 2.5 * (this.t[1] - this.t[0]));
+    const patience = Math.max(5, 4 * this.header.tdm_period, 2.5 * (this.t[1] - this.t[0] || 0));
     return k >= 0 && t - this.reports[k].t < patience ? this.reports[k].targets : [];
   }
 

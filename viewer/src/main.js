@@ -30,9 +30,9 @@ class Page {
   }
 
   /** A whole episode, or what is new in a live one. */
-  take(part) {
+  take(...parts) {
     const first = !this.episode.header;
-    this.episode.extend(part);
+    for (const part of parts) this.episode.extend(part);
     this.view.load(this.episode);
     if (first) this.start();
     if (first && this.live) this.play(true);
@@ -341,13 +341,26 @@ async function run() {
     return page.take(part);
   }
   document.body.classList.add("live");
-  let queue = Promise.resolve();
+  const waiting = [];
+  let idle = true, over = null;
+  // all that came since the last time at once: a slow computer must not fall behind
+  const read = async () => {
+    if (!idle) return;
+    idle = false;
+    while (waiting.length) page.take(...(await Promise.all(waiting.splice(0).map(unpack))));
+    if (over !== null) page.finish(over);
+    idle = true;
+  };
   const source = new EventSource(live);
-  source.addEventListener("part", (e) => (queue = queue.then(async () => page.take(await unpack(e.data)))));
+  source.addEventListener("part", (e) => {
+    waiting.push(e.data);
+    read();
+  });
   source.addEventListener("pace", (e) => (page.pace = +e.data));
   source.addEventListener("end", (e) => {
     source.close();
-    queue = queue.then(() => page.finish(e.data));
+    over = e.data;
+    read();
   });
 }
 
