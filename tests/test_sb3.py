@@ -26,12 +26,13 @@ from usv_gym.policies import Controller, make_policy
 from usv_gym.policies.learned import MEMBER, LearnedPolicy, digest, load_policy, read_meta
 from usv_gym.run import plan, run
 from usv_gym.sb3 import SB3VecEnv, make_vec_env
+from usv_gym.tasks.task import N_OWN, N_TARGET
 from usv_gym.train import HELD_OUT, evaluate, plan_training, train
 
 torch.set_num_threads(1)  # two wait for each other where a core is busy
 OPEN_SEA = "usv_gym/OpenSea-v0"
 SHORT = ["simulation.duration=10"]
-QUICK = ["ppo.n_steps=8", "ppo.batch_size=16", "ppo.n_epochs=1", "ppo.layers=[8]", "simulation.duration=10"]
+QUICK = ["ppo.n_steps=8", "ppo.batch_size=16", "ppo.n_epochs=1", "ppo.layers=[8]", "ppo.encoder=4", "simulation.duration=10"]
 
 
 # --- the adapter -----------------------------------------------------------------------------------------------------
@@ -184,6 +185,25 @@ def test_the_file_acts_like_the_model(trained):
     assert np.allclose(policy.act(obs[0]), expected[0], atol=1e-6)
 
 
+@pytest.mark.parametrize("observation", ["truth", "sectors"])
+def test_dict_observations(observation, tmp_path):
+    settings = [*QUICK, "env.flat=false", f"env.observation={observation}", "env.targets=3", "env.action=discrete"]
+    train(plan_training("OpenSea-v0", envs=2, settings=settings), 16, tmp_path, episodes=2)
+    assert load_policy(tmp_path / "policy.zip").task.flat is False
+
+
+def test_the_order_of_the_targets_does_not_matter(trained):
+    _, out, _, _ = trained
+    policy = load_policy(out / "policy.zip")
+    obs = make_vec_env(OPEN_SEA, 1).observation_space.sample()
+    targets = obs[N_OWN:].reshape(-1, N_TARGET)
+    targets[:, 0] = [1, 1, 1, 1, 1, 0, 0, 0]
+    expected = policy.act(obs)
+    for order in ([4, 3, 2, 1, 0, 5, 6, 7], [1, 0, 2, 3, 4, 7, 6, 5]):
+        shuffled = np.concatenate([obs[:N_OWN], targets[order].ravel()])
+        assert np.allclose(policy.act(shuffled), expected, atol=1e-6)
+
+
 def test_evaluation_equals_single_environments(trained):
     _, out, _, _ = trained
     policy = load_policy(out / "policy.zip")
@@ -300,7 +320,7 @@ def test_broken_files_are_refused_with_one_line(trained, tmp_path):
         (rewrite(good, tmp_path / "b.zip", **{MEMBER: json.dumps({**meta, "steps": 1})}), "does not match its hash"),
         (rewrite(good, tmp_path / "c.zip", **{MEMBER: "[]"}), "expected usv-policy version 1"),
         (rewrite(good, tmp_path / "d.zip", **{MEMBER: sealed(spaces={"observation": "Box[7] float32"})}), "another version"),
-        (rewrite(good, tmp_path / "e.zip", **{MEMBER: sealed(network={"layers": [9]})}), "weights do not fit"),
+        (rewrite(good, tmp_path / "e.zip", **{MEMBER: sealed(network={"layers": [9], "encoder": 0})}), "weights do not fit"),
         (rewrite(good, tmp_path / "f.zip", **{MEMBER: sealed(network={"layers": [9, -1]})}), "layers"),
         (rewrite(good, tmp_path / "g.zip", **{"policy.pth": None}), "policy.pth"),
         (rewrite(good, tmp_path / "h.zip", **{MEMBER: sealed(task={"action": "fly"})}), "action"),

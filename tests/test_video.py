@@ -133,12 +133,12 @@ def test_no_archive_there(tmp_path):
 def test_record_video_of_gymnasium(tmp_path):
     pytest.importorskip("moviepy", reason="RecordVideo needs moviepy, an optional dependency of Gymnasium")
     env = gym.make("usv_gym/OpenSea-v0", render_mode="rgb_array")
-    env = gym.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda k: True, disable_logger=True)
+    env = gym.wrappers.RecordVideo(env, str(tmp_path / "film"), episode_trigger=lambda k: True, disable_logger=True)
     env.reset(seed=1)
     for _ in range(3):
         env.step(env.action_space.sample())
     env.close()
-    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]
+    assert [path.suffix for path in (tmp_path / "film").iterdir()] == [".mp4"]
 
 
 def test_frames_are_what_record_video_needs():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
 import subprocess
@@ -479,7 +478,7 @@ def test_playing_needs_no_pygame_to_be_imported():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_command_line(monkeypatch, tmp_path, capsys, episode):
+def test_command_line(monkeypatch, tmp_path):
     from typer.testing import CliRunner
 
     from usv_gym.cli import app
@@ -499,4 +498,6 @@ def test_command_line(monkeypatch, tmp_path, capsys, episode):
     assert load(tmp_path / "out" / "episode.usv").meta["policy"] == "waypoints"
     assert CliRunner().invoke(app, ["watch", str(tmp_path / "out"), "--palette", "night"]).exit_code == 0
     assert seen == [pytest.approx(1.0), pytest.approx(1.0)]
-    assert not math.isnan(seen[0])
+    for bad in (["--palette", "noon"], ["--record", __file__]):
+        run = CliRunner().invoke(app, ["play", "calm_crossing", *bad])
+        assert isinstance(run.exception, ConfigError)

@@ -147,8 +147,12 @@ def play(
     ] = False,
 ) -> None:
     """Sail a scenario in a window: by keyboard or gamepad, or watch a policy; spawn and move obstacles with the mouse."""
+    from .config import ConfigError
     from .play import Live, plan_by_hand, show
     from .run import plan, write_outputs
+
+    if record is not None and record.exists() and not record.is_dir():
+        raise ConfigError(f"{record}: is a file; expected a directory for the results")
 
     source = scenario[0] if len(scenario) == 1 else scenario
     if policy is None:

@@ -1,8 +1,8 @@
 """A mission under way in the browser: the page of the 3-D replay, fed over localhost while the episode runs.
 
-``GET /`` is the page, ``GET /events`` a stream of server-sent events (``pace``: simulated seconds per second; ``part``: what is
-new, as ``replay.html.pack`` makes it; ``end``: the outcome), ``POST /spawn`` puts an iceberg where it is told to.  Only this
-machine can connect.
+``GET /`` is the page, ``GET /events`` a stream of server-sent events (``pace``: simulated seconds per second; ``part``:
+what is new, as ``replay.html.pack`` makes it; ``end``: the outcome), ``POST /spawn`` puts an iceberg where it is told
+to.  Only this machine can connect.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Broadcast:
             self._news.notify_all()
 
     def newer(self, than: float) -> tuple[Episode, str] | None:
-        """The episode so far and its outcome, as soon as it is longer than ``than`` [s]; None if that takes too long."""
+        """The episode so far and its outcome, once it is longer than ``than`` [s]; None if that takes too long."""
         with self._news:
             self._news.wait_for(lambda: self._stopped or self.episode.t[-1] > than, PATIENCE)
             return (self.episode, self.outcome) if self.episode.t[-1] > than else None

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from gymnasium.utils.seeding import np_random
 
+from .config import ConfigError
 from .envs.core import Core
 from .envs.notice import compiling
 from .policies import make_policy
 from .render.desk import Thing
+from .render.palette import PALETTES
 from .render.panel import clock
 from .render.primitives import Primitive, Scene
 from .render.scene import History, scene_from_episode, scene_from_snapshot, sea_from_record
@@ -349,6 +351,8 @@ def show(what: Callable[[], Any], *, palette: str = "day", ratio: float | None =
     from .render.desk import Desk
     from .render.window import Window
 
+    if palette not in PALETTES:
+        raise ConfigError(f"--palette {palette}: expected one of {', '.join(PALETTES)}")
     window = Window(title, ratio=ratio)
     try:
         stage = what()

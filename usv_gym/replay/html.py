@@ -1,7 +1,7 @@
 """The 3-D replay: an episode and its viewer in one HTML file that needs no network.
 
-The episode travels as columns of whole numbers, see ``pack``; ``docs/replay.md`` says what a reader may rely on.  The viewer
-is the bundle in ``viewer/viewer.html``, built from ``viewer/`` at the top of the repository.
+The episode travels as columns of whole numbers, see ``pack``; ``docs/replay.md`` says what a reader may rely on.  The
+viewer is the bundle in ``viewer/viewer.html``, built from ``viewer/`` at the top of the repository.
 """
 
 from __future__ import annotations
@@ -90,9 +90,9 @@ def title(meta: Mapping[str, Any]) -> str:
 def pack(episode: Episode, *, since: float = -math.inf, stride: int = 1, thin: int = 1) -> bytes:
     """An episode, or what is new in one, as the viewer reads it.
 
-    zlib of: length of the header (u32, little endian); header (JSON); the columns it lists as ``[name, rows, count, quantum,
-    order]``, one after the other.  A column holds whole multiples of its quantum, row after row, as ``order``-fold
-    differences, zigzag-coded (0, -1, 1, -2 ..) in little-endian groups of 7 bits.
+    zlib of: length of the header (u32, little endian); header (JSON); the columns it lists as ``[name, rows, count,
+    quantum, order]``, one after the other.  A column holds whole multiples of its quantum, row after row, as
+    ``order``-fold differences, zigzag-coded (0, -1, 1, -2 ..) in little-endian groups of 7 bits.
 
     Parameters
     ----------
