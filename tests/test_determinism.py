@@ -11,9 +11,10 @@ from gymnasium.utils.seeding import np_random
 from usv_gym.envs.core import Core
 from usv_gym.envs.single import OpenSeaEnv
 from usv_gym.replay.archive import load, save
-from usv_gym.run import Mission, plan, resimulate, run
+from usv_gym.run import plan, resimulate, run
 from usv_gym.scenarios.build import build_worlds
 from usv_gym.tasks.task import TaskConfig
+from usv_gym.voyage import Mission
 
 STEPS = 200
 #: random seas, strong wind, and sensors that lose, delay and miss

@@ -20,7 +20,7 @@ LAYERS = (
     "engine scenarios",  # one tick; where worlds come from
     "tasks metrics colregs policies",  # the decision problem, how it is judged, who decides
     "render.palette replay render envs",  # archive and outputs, map, faces
-    "run play live sb3 train traffic_v0 campaign hil",  # jobs and further faces
+    "voyage run play live sb3 train traffic_v0 campaign hil",  # jobs and further faces
     "cli",
 )
 PLACE = {name: (layer, k) for layer, row in enumerate(LAYERS) for k, name in enumerate(row.split())}

@@ -124,7 +124,7 @@ def train(
         _complain(KeyboardInterrupt(f"interrupted; {directory} has a checkpoint: go on with --resume"))
         raise typer.Exit(130) from None
     print_evaluations(results, console)
-    console.print(f"[bold]{directory}[/]: policy.zip  checkpoints  logs  evaluation.json")
+    console.print(f"[bold]{directory}[/]: policy.zip  checkpoints  logs{'  evaluation.json' if results else ''}")
 
 
 Palette = Annotated[str, typer.Option(help="colours: day, dark or night")]

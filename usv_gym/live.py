@@ -18,10 +18,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from .config import ConfigError
-from .play import Voyage
 from .replay.archive import Episode
 from .replay.html import pack, page, title
-from .run import Mission
+from .voyage import Mission, Voyage
 
 RADIUS = 10.0  #: [m] of an obstacle that is put into the world
 PUBLISH = 0.2  #: [s] of real time between two parts, at least

@@ -5,17 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gymnasium.utils.seeding import np_random
 
 from .config import ConfigError
-from .envs.core import Core
-from .envs.notice import compiling
-from .policies import make_policy
 from .render.desk import Thing
 from .render.palette import PALETTES
 from .render.panel import clock
@@ -24,21 +19,17 @@ from .render.scene import History, scene_from_episode, scene_from_snapshot, sea_
 from .render.scene_episode import sea_from_episode
 from .render.sea import HULLS, OBSTACLES, Sea
 from .replay.archive import Episode
-from .replay.recorder import Recorder
-from .run import Mission, plan, task_of
-from .scenarios.commands import Commands, Notice
+from .run import plan
+from .scenarios.commands import Commands
 from .scenarios.loader import Source, load_scenario
-from .tasks.task import OUTCOMES, TaskConfig, unflatten
 from .units import KNOT
+from .voyage import BY_HAND, Mission, Voyage
 from .world.state import AIS_NONE
 
-_ONE = np.ones(1, np.bool_)
-BY_HAND = "by hand"  #: the policy of a mission that the user steers
 INTERVAL = 0.1  #: [s] control interval, about, when the user steers
 BUDGET = 0.04  #: [s] of real time that a frame may spend on simulating; what does not fit is left out
-#: a mission that goes on whatever happens
-ENDLESS = {"end_on_collision": False, "end_on_arrival": False, "end_out_of_area": False}
-ENDINGS = {"collision": "collision", "arrival": "arrived", "out_of_area": "left the area", "time_limit": "time is up"}
+ENDINGS = {"collision": "collision", "arrival": "arrived", "out_of_area": "left the area", "time_limit": "time is up",
+           "log_end": "the log is over"}  # fmt: skip
 
 
 def plan_by_hand(source: Source, *, vessel: str | None = None, overrides: Sequence[str] = (), seed: int = 0) -> Mission:
@@ -48,91 +39,6 @@ def plan_by_hand(source: Source, *, vessel: str | None = None, overrides: Sequen
     return replace(
         plan(source, policy="idle", vessel=vessel, overrides=[interval, *overrides], seed=seed), policy=BY_HAND
     )
-
-
-class Voyage:
-    """A mission under way: its world, who steers, the commands given to it, and the recording of it all."""
-
-    def __init__(self, mission: Mission) -> None:
-        """Cast off."""
-        self.mission = mission
-        self.controller: Any = None
-        rows = mission.rows
-        if mission.policy == BY_HAND:
-            self.config = TaskConfig(action="throttle_nozzle", **ENDLESS)  # type: ignore[arg-type]
-        elif rows is not None:
-            self.config = TaskConfig(**ENDLESS)  # type: ignore[arg-type]
-        else:
-            self.controller = make_policy(mission.policy, trust=mission.trust)
-            self.config = task_of(self.controller)
-        # a log is recorded tick by tick
-        tick = [f"simulation.control_interval={mission.scenario.simulation.dt!r}"] if rows is not None else []
-        with ExitStack() as stack:
-            stack.enter_context(compiling())
-            self.core = Core(1, source=mission.scenario, config=self.config, overrides=tick)
-            self.steps = len(rows) if rows is not None else int(self.core.task["max_steps"][0])
-            self.core.task["max_steps"] = self.steps
-            self.core.reset(_ONE, [np_random(mission.seed)[0]])
-        self.commands = Commands(self.core.worlds, 0, self.core.ids(0), self.core.scenario)
-        self.recorder = Recorder()
-        self.recorder.sample(self.core.worlds)
-        if self.controller is not None:
-            self.controller.reset({**self.core.info(0), "scales": self.core.scales()})
-        self.step_count = 0
-
-    @property
-    def world(self) -> Any:
-        """The record of the world."""
-        return self.core.worlds[0]
-
-    @property
-    def t(self) -> float:
-        """Time [s]."""
-        return float(self.world["tick"] * self.world["dt"])
-
-    @property
-    def outcome(self) -> str:
-        """Why it is over; empty while it is not."""
-        if self.core.terminated[0] or self.core.truncated[0]:
-            return OUTCOMES[self.core.episodes["outcome"][0]]
-        return "time_limit" if self.step_count >= self.steps else ""
-
-    def step(self, demand: tuple[float, float] = (0.0, 0.0)) -> list[Notice]:
-        """One control step; ``demand`` is the action (surge, yaw) of a mission that is steered by hand."""
-        core, rows = self.core, self.mission.rows
-        if rows is not None:
-            row = rows[self.step_count]
-            self.recorder.action(row)
-            core.step(rows=row[None])
-        else:
-            if self.controller is None:
-                core.actions[0] = demand
-            else:
-                flat = core.obs[0]
-                core.actions[0] = self.controller.act(flat.copy() if self.config.flat else unflatten(self.config, flat))
-            self.recorder.action(core.actions[0])
-            core.step()
-        self.step_count += 1
-        self.recorder.sample(core.worlds)
-        notices = self.commands.notices()
-        for notice in notices:
-            self.recorder.event(notice.t, notice.kind, notice.source, notice.text or notice.id)
-        return notices
-
-    def finish(self) -> Episode:
-        """The episode so far."""
-        mission, core = self.mission, self.core
-        return self.recorder.finish(
-            names=self.commands.called,
-            scenario=mission.scenario.dump(),
-            seed=mission.seed,
-            policy=mission.policy,
-            vessel=core.model.name,
-            control_interval=core.control_interval,
-            outcome={"outcome": self.outcome or "interrupted", "closest_m": float(core.episodes["closest"][0])},
-            task=self.config.dump(),
-            orders=[[tick, command, arguments] for tick, command, arguments in self.commands.log],
-        )
 
 
 class Live:

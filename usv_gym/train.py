@@ -31,8 +31,8 @@ from .policies.learned import (
     write_policy,
 )
 from .replay.archive import replacing
-from .run import task_of
 from .tasks.task import OUTCOMES, TaskConfig, unflatten
+from .voyage import task_of
 
 if TYPE_CHECKING:
     from rich.console import Console
