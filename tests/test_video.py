@@ -57,6 +57,7 @@ def test_gif(ten_seconds, tmp_path):
     assert still > 0.6  # and the map stays where it is
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # imageio_ffmpeg's reader leaves its pipes open
 def test_mp4(ten_seconds, tmp_path):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     n = write_film(ten_seconds, tmp_path / "film.mp4", size=(201, 151), fps=10, speed=20)

@@ -216,7 +216,8 @@ class Commands:
         w["ais"]["next_tick"][source] = _FAR
         if group["ais_on"][slot] and group["ais_class"][slot] and w["sensors"]["ais_on"] and w["sensors"]["exteroceptive"]:
             w["ais"]["next_tick"][source] = w["tick"] + 1
-            self.worlds["next_sense"][self.b] = min(int(w["next_sense"]), int(w["tick"]) + 1)
+            for first in ("ais_soonest", "next_sense"):
+                self.worlds[first][self.b] = min(int(w[first]), int(w["tick"]) + 1)
 
     def _forget(self, source: int) -> None:
         """Make a slot new to every sensor."""

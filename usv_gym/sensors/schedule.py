@@ -17,23 +17,35 @@ def first_events(w):
         w.ais.next_tick[s] = NEVER
         if w.sensors.exteroceptive:
             schedule(w, s, w.tick)
+    w.ais_soonest = 0
     _set_next(w, w.tick)
 
 
 @inner
+def _soonest_message(w, tick):
+    """First tick after ``tick`` at which an AIS message is sent or arrives."""
+    soonest = NEVER
+    for s in range(w.ais.next_tick.shape[0]):
+        soonest = min(soonest, w.ais.next_tick[s])
+        for o in range(w.observer.shape[0]):
+            if w.ais.due_tick[o, s] > tick:
+                soonest = min(soonest, w.ais.due_tick[o, s])
+    return soonest
+
+
+@inner
 def _set_next(w, tick):
+    """Set ``w.next_sense`` after what was due at ``tick`` is done."""
     p = w.sensors
     soonest = NEVER
     if p.exteroceptive:
-        for s in range(w.ais.next_tick.shape[0]):
-            soonest = min(soonest, w.ais.next_tick[s])
+        if tick >= w.ais_soonest:
+            w.ais_soonest = _soonest_message(w, tick)
+        soonest = w.ais_soonest
         for o in range(w.observer.shape[0]):
             for k in range(2):
                 if w.tracks.scan_due[o, k] > tick:
                     soonest = min(soonest, w.tracks.scan_due[o, k])
-            for s in range(w.ais.next_tick.shape[0]):
-                if w.ais.due_tick[o, s] > tick:
-                    soonest = min(soonest, w.ais.due_tick[o, s])
         if p.radar.on:
             soonest = min(soonest, next_fire(tick, w.dt_us, p.radar.period_us))
         if p.lidar.on:
@@ -59,8 +71,9 @@ def sense(w, tick):
     radar = p.radar.on and _due(tick, w.dt_us, p.radar.period_us)
     lidar = p.lidar.on and _due(tick, w.dt_us, p.lidar.period_us)
     report = _due(tick, w.dt_us, p.tdm_period_us)
+    ais = tick >= w.ais_soonest
     for make_room in (True, False):
-        if not make_room:
+        if ais and not make_room:
             for s in range(S):
                 if tick >= w.ais.next_tick[s]:
                     if transmits(w, s):
@@ -70,11 +83,12 @@ def sense(w, tick):
         for o in range(w.observer.shape[0]):
             if w.vessels.active[w.observer[o]] == 0:
                 continue
-            for s in range(S):
-                due = w.ais.due_tick[o, s]
-                if due >= 0 and (due <= tick or (make_room and tick >= w.ais.next_tick[s])):
-                    w.ais.due_tick[o, s] = -1
-                    take_ais(w, o, s)
+            if ais:
+                for s in range(S):
+                    due = w.ais.due_tick[o, s]
+                    if due >= 0 and (due <= tick or (make_room and tick >= w.ais.next_tick[s])):
+                        w.ais.due_tick[o, s] = -1
+                        take_ais(w, o, s)
             if not make_room:
                 if radar:
                     scan_radar(w, o, tick)

@@ -126,7 +126,7 @@ def take_scan(w, o, k, s, scan):
         f = max(scan.gain * math.hypot(x[0] - w.nav.position[o, 0], x[1] - w.nav.position[o, 1]), scan.gain_floor)
     t.phase[o, s, k + 1] = PHASE_NONE if fresh else phase
     started = False
-    if phase != PHASE_MOTION:
+    if phase != PHASE_MOTION and (t.phase[o, s, AIS] != PHASE_NONE or t.phase[o, s, 2 - k] != PHASE_NONE):
         # another sensor may know how the target moves: then start from its heading and speed
         _drop_silent(w, o, s, stamp)
         own_phase = t.phase[o, s, k + 1]

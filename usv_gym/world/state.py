@@ -289,6 +289,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("tick", i8), ("dt_us", i8), ("dt", f8),
         ("frame_ticks", i8), ("frame_tick", i8),  # ticks per traffic frame; tick at which the current frame began
         ("traffic_tick", i8),  # tick to which positions of traffic refer
+        ("ais_soonest", i8),  # first tick at which any AIS message is sent or arrives
         ("next_sense", i8), ("next_nav", i8),  # first tick at which any exteroceptive sensor, any navigation sensor fires
         ("seed", u8),
         ("origin", f8, (2,)), ("metres_per_degree", f8, (2,)),  # latitude, longitude [deg]; [m/deg]
