@@ -31,6 +31,8 @@ def next_fire(tick, dt_us, period_us):
     """First tick after ``tick`` at which floor(t / period) advances."""
     if period_us <= 0:
         return NEVER
+    if period_us <= dt_us:  # every tick; and divisions are dear
+        return tick + 1
     k = (tick * dt_us) // period_us + 1
     return max((k * period_us + dt_us - 1) // dt_us, tick + 1)
 

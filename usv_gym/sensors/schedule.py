@@ -56,7 +56,9 @@ def _set_next(w, tick):
 
 @inner
 def _due(tick, dt_us, period_us):
-    return period_us > 0 and (tick * dt_us) // period_us > ((tick - 1) * dt_us) // period_us
+    if period_us <= dt_us:
+        return period_us > 0
+    return (tick * dt_us) // period_us > ((tick - 1) * dt_us) // period_us
 
 
 @spliced
