@@ -135,6 +135,8 @@ class Core:
         self._what, self._outcome = self.episodes["what"], self.episodes["outcome"]
         self._closest, self._to_go = self.episodes["closest"], self.episodes["to_go"]
         self._tick = self.worlds["tick"]
+        # by row, for the single environment: making a view costs as much as half a kernel call
+        self._rows = list(zip(self.obs, self.actions, self.terms, strict=True))
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -255,7 +257,10 @@ class Core:
         ValueError
             if an action is not finite, or none of ``discrete``; nothing has moved then.
         """
-        self._what[:] = STEP if mask is None else np.where(mask, STEP, 0)
+        if mask is None:
+            self._what.fill(STEP)
+        else:
+            self._what[:] = np.where(mask, STEP, 0)
         bad = self._run(rows)
         if bad >= 0:
             expected = "a whole number from 0 to 4" if self.config.action == "discrete" else "finite numbers"
@@ -279,6 +284,10 @@ class Core:
         observe_batch(self.worlds, self.task, self._obs)
         return self.obs
 
+    def row(self, b: int) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Views of the observation [n] and of the action [channels] of row b."""
+        return self._rows[b][:2]
+
     def scales(self) -> dict[str, float]:
         """What turns observations and actions into SI units: the scales of the task and facts of the vessel."""
         config = self.config
@@ -297,7 +306,7 @@ class Core:
         """The info dict of row b after a step."""
         outcome = OUTCOMES[self._outcome.item(b)]
         return {
-            "reward_terms": dict(zip(TERMS, self.terms[b].tolist(), strict=True)),
+            "reward_terms": dict(zip(TERMS, self._rows[b][2].tolist(), strict=True)),
             "time": self._tick.item(b) * self._dt,
             "closest": self._closest.item(b),
             "to_go": self._to_go.item(b),

@@ -115,15 +115,15 @@ class USVEnv(gym.Env[Any, Any]):
                              weather=weather)  # fmt: skip
         self.action_space = self.core.action_space
         self.observation_space = self.core.observation_space
-        self._action_shape = self.action_space.shape
+        self._action_shape, self._flat = self.action_space.shape, config.flat
         self._started = False
         self._commands: Commands | None = None
         self._history: Any = None
         self._window: Any = None
 
     def _observation(self) -> Any:
-        flat = self.core.obs[0]
-        return flat.copy() if self.core.config.flat else unflatten(self.core.config, flat)
+        flat = self.core.row(0)[0]
+        return flat.copy() if self._flat else unflatten(self.core.config, flat)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start a new episode; options: scenario, vessel, weather, difficulty."""
@@ -153,7 +153,7 @@ class USVEnv(gym.Env[Any, Any]):
         try:
             fits = getattr(action, "shape", None) == self._action_shape or np.shape(action) == self._action_shape
             if fits:
-                core.actions[0] = action
+                core.row(0)[1][:] = action
         except (ValueError, TypeError):
             fits = False
         if not fits:

@@ -10,6 +10,7 @@ import math
 from .. import rng
 from ..jit import inner
 from ..trig import atan2, sincos, wrap, wrap_positive
+from ..world.geometry import waypoint_reached
 from .ais import next_fire
 
 
@@ -19,15 +20,7 @@ def follow_own_route(w, o):
     j = w.observer[o]
     r, nav = w.routes, w.nav
     while nav.leg[o] < r.count[j]:
-        k = nav.leg[o]
-        dn = r.waypoint[j, k, 0] - nav.position[o, 0]
-        de = r.waypoint[j, k, 1] - nav.position[o, 1]
-        reached = dn * dn + de * de <= r.radius[j] * r.radius[j]
-        if not reached and k > 0:
-            ln = r.waypoint[j, k, 0] - r.waypoint[j, k - 1, 0]
-            le = r.waypoint[j, k, 1] - r.waypoint[j, k - 1, 1]
-            reached = ln * dn + le * de < 0.0 and dn * dn + de * de <= 9.0 * r.radius[j] * r.radius[j]
-        if not reached:
+        if not waypoint_reached(r, j, nav.leg[o], nav.position[o, 0], nav.position[o, 1]):
             return
         nav.leg[o] += 1
     nav.route_done[o] = r.count[j] > 0

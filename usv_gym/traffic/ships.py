@@ -11,6 +11,7 @@ import math
 
 from ..jit import inner
 from ..trig import TWO_PI, atan2, clip, sincos, wrap
+from ..world.geometry import waypoint_reached
 from ..world.state import (
     AFTER_CONTINUE,
     AFTER_LOOP,
@@ -23,24 +24,11 @@ DEAD_BAND = 2.0 * math.pi / 180.0  #: [rad] of the original's constant-rate turn
 
 @inner
 def follow_route(w, j):
-    """Advance the active leg of vessel j as far as its position allows.
-
-    A waypoint counts as reached inside its circle of acceptance, or once the ship has passed it (its projection on the
-    leg lies beyond the end while it is within three radii of the waypoint), so that no ship circles one it cannot hit.
-    """
+    """Advance the active leg of vessel j as far as its position allows."""
     r = w.routes
     while r.leg[j] < r.count[j] and r.done[j] == 0:
         k = r.leg[j]
-        dn = r.waypoint[j, k, 0] - w.vessels.eta[j, 0]
-        de = r.waypoint[j, k, 1] - w.vessels.eta[j, 1]
-        distance2 = dn * dn + de * de
-        radius2 = r.radius[j] * r.radius[j]
-        reached = distance2 <= radius2
-        if not reached and k > 0 and distance2 <= 9.0 * radius2:
-            ln = r.waypoint[j, k, 0] - r.waypoint[j, k - 1, 0]
-            le = r.waypoint[j, k, 1] - r.waypoint[j, k - 1, 1]
-            reached = ln * dn + le * de < 0.0
-        if not reached:
+        if not waypoint_reached(r, j, k, w.vessels.eta[j, 0], w.vessels.eta[j, 1]):
             return
         r.reached[j] += 1
         if k + 1 < r.count[j]:

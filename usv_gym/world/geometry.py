@@ -119,3 +119,23 @@ def far_distance(dn, de, s1, c1, l1, b1, s2, c2, l2, b2):
     r = math.sqrt(rn * rn + re * re)
     along = abs(rn * c1 + re * s1) * 0.5 * l1 + abs(re * c1 - rn * s1) * 0.5 * b1
     return max(r - 0.5 * b2 - (along / r if r > 0.0 else 0.0), 0.0)
+
+
+@inner
+def waypoint_reached(routes, j, k, north, east):
+    """True if someone at a place has reached waypoint k of vessel j's route.
+
+    That is inside its circle of acceptance, or past it: with the projection on the leg beyond its end while within three
+    radii, so that nobody circles a waypoint that cannot be hit.
+    """
+    dn = routes.waypoint[j, k, 0] - north
+    de = routes.waypoint[j, k, 1] - east
+    distance2 = dn * dn + de * de
+    radius2 = routes.radius[j] * routes.radius[j]
+    if distance2 <= radius2:
+        return True
+    if k == 0 or distance2 > 9.0 * radius2:
+        return False
+    ln = routes.waypoint[j, k, 0] - routes.waypoint[j, k - 1, 0]
+    le = routes.waypoint[j, k, 1] - routes.waypoint[j, k - 1, 1]
+    return ln * dn + le * de < 0.0
