@@ -59,6 +59,46 @@ def _follow(w, j, s, disc, l2, b2, n2, e2, p2, dn2, de2, dp2):
 
 
 @inner
+def _pass_discs(w, o, j):
+    """Distances of vessel j to all discs as if they were far, without a branch, so that the loop becomes vector code.
+
+    Leaves the distance over the frame in ``w.ranges`` and at its end in ``safety.distance``, and 1 in ``w.hidden`` for the
+    discs that came close and have to be followed.
+    """
+    v, m = w.vessels, w.obstacles
+    V = v.active.shape[0]
+    n1, e1 = v.frame_eta[j, 0], v.frame_eta[j, 1]
+    dn1, de1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1
+    half_l, half_b = 0.5 * v.length[j], 0.5 * v.beam[j]
+    limit = math.sqrt(half_l * half_l + half_b * half_b) + CLOSE
+    s1, c1 = sincos(v.eta[j, 2])
+    for i in range(m.active.shape[0]):
+        rn, re = n1 - m.frame_position[i, 0], e1 - m.frame_position[i, 1]
+        vn = dn1 - (m.position[i, 0] - m.frame_position[i, 0])
+        ve = de1 - (m.position[i, 1] - m.frame_position[i, 1])
+        t = min(max(-(rn * vn + re * ve) / max(vn * vn + ve * ve, 1.0e-12), 0.0), 1.0)
+        an, ae = rn + t * vn, re + t * ve
+        bn, be = rn + vn, re + ve
+        a = math.sqrt(an * an + ae * ae) + 1.0e-9
+        b = math.sqrt(bn * bn + be * be) + 1.0e-9
+        a_near = a - m.radius[i] - (abs(an * c1 + ae * s1) * half_l + abs(ae * c1 - an * s1) * half_b) / a
+        b_near = b - m.radius[i] - (abs(bn * c1 + be * s1) * half_l + abs(be * c1 - bn * s1) * half_b) / b
+        end = max(b_near, 0.0)
+        w.ranges[V + i] = min(max(a_near, 0.0), end)
+        w.half_angles[V + i] = end
+        w.hidden[V + i] = 1 if a < limit + m.radius[i] else 0
+
+
+@inner
+def _note(safety, o, s, near, end):
+    safety.distance[o, s] = end
+    safety.closest[o, s] = min(safety.closest[o, s], near)
+    safety.step_closest[o] = min(safety.step_closest[o], near)
+    if near <= 0.0 and safety.collided_with[o] < 0:
+        safety.collided_with[o] = s
+
+
+@inner
 def sweep(w):
     """Distances of every observer's hull to every source over the frame that ends now."""
     v, m, safety = w.vessels, w.obstacles, w.safety
@@ -72,36 +112,36 @@ def sweep(w):
         l1, b1 = v.length[j], v.beam[j]
         s1, c1 = sincos(v.eta[j, 2])
         reach1 = 0.5 * math.sqrt(l1 * l1 + b1 * b1)
-        for s in range(safety.distance.shape[1]):
-            disc = s >= V
-            i = s - V
-            if (m.active[i] if disc else v.active[s]) == 0 or s == j:
+        for s in range(V):
+            if v.active[s] == 0 or s == j:
                 continue
-            if disc:
-                n2, e2, p2 = m.frame_position[i, 0], m.frame_position[i, 1], 0.0
-                dn2, de2, dp2 = m.position[i, 0] - n2, m.position[i, 1] - e2, 0.0
-                l2 = b2 = 2.0 * m.radius[i]
-                reach2 = m.radius[i]
-            else:
-                n2, e2, p2 = v.frame_eta[s, 0], v.frame_eta[s, 1], v.frame_eta[s, 2]
-                dn2, de2, dp2 = v.eta[s, 0] - n2, v.eta[s, 1] - e2, v.eta[s, 2] - p2
-                l2, b2 = v.length[s], v.beam[s]
-                reach2 = 0.5 * math.sqrt(l2 * l2 + b2 * b2)
+            n2, e2, p2 = v.frame_eta[s, 0], v.frame_eta[s, 1], v.frame_eta[s, 2]
+            dn2, de2, dp2 = v.eta[s, 0] - n2, v.eta[s, 1] - e2, v.eta[s, 2] - p2
+            l2, b2 = v.length[s], v.beam[s]
             rn, re = n1 - n2, e1 - e2
             vn, ve = dn1 - dn2, de1 - de2
             travelled2 = vn * vn + ve * ve
             t = min(max(-(rn * vn + re * ve) / travelled2, 0.0), 1.0) if travelled2 > 0.0 else 1.0
-            limit = reach1 + reach2 + CLOSE
+            limit = reach1 + 0.5 * math.sqrt(l2 * l2 + b2 * b2) + CLOSE
             if (rn + t * vn) ** 2 + (re + t * ve) ** 2 > limit * limit:
-                s2, c2 = (0.0, 1.0) if disc else sincos(p2 + dp2)
+                s2, c2 = sincos(p2 + dp2)
                 end = far_distance(rn + vn, re + ve, s1, c1, l1, b1, s2, c2, l2, b2)
                 near = end
                 if 0.0 < t < 1.0:  # passing: the nearest point lies within the frame
                     near = min(near, far_distance(rn + t * vn, re + t * ve, s1, c1, l1, b1, s2, c2, l2, b2))
             else:
-                near, end = _follow(w, j, s, disc, l2, b2, n2, e2, p2, dn2, de2, dp2)
-            safety.distance[o, s] = end
-            safety.closest[o, s] = min(safety.closest[o, s], near)
-            safety.step_closest[o] = min(safety.step_closest[o], near)
-            if near <= 0.0 and safety.collided_with[o] < 0:
-                safety.collided_with[o] = s
+                near, end = _follow(w, j, s, False, l2, b2, n2, e2, p2, dn2, de2, dp2)
+            _note(safety, o, s, near, end)
+        _pass_discs(w, o, j)
+        for i in range(m.active.shape[0]):
+            if m.active[i] == 0:
+                continue
+            s = V + i
+            near, end = w.ranges[s], w.half_angles[s]
+            if w.hidden[s]:
+                d2 = 2.0 * m.radius[i]
+                n2, e2 = m.frame_position[i, 0], m.frame_position[i, 1]
+                near, end = _follow(
+                    w, j, s, True, d2, d2, n2, e2, 0.0, m.position[i, 0] - n2, m.position[i, 1] - e2, 0.0
+                )
+            _note(safety, o, s, near, end)
