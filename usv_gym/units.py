@@ -7,7 +7,6 @@ import math
 KNOT = 1852.0 / 3600.0  #: metres per second in one knot
 DEG = math.pi / 180.0  #: radians in one degree
 DEG_PER_MIN = DEG / 60.0  #: rad/s in one degree per minute (the unit of AIS rate of turn)
-NAUTICAL_MILE = 1852.0  #: metres
 
 #: WGS-84 semi-major axis [m] and first eccentricity squared
 WGS84_A = 6378137.0
@@ -26,11 +25,6 @@ def metres_per_degree(latitude_deg: float) -> tuple[float, float]:
         WGS84_A * (1.0 - WGS84_E2) / w**3 * DEG,
         WGS84_A / w * math.cos(latitude_deg * DEG) * DEG,
     )
-
-
-def wrap_pi(angle: float) -> float:
-    """Angle [rad] wrapped to [-pi, pi)."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def wrap_360(angle_deg: float) -> float:

@@ -15,19 +15,19 @@ from gymnasium.utils.seeding import np_random
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from ..config import ConfigError, Document, validate
+from ..config import ConfigError
 from ..scenarios.build import build_worlds, write_agent
 from ..scenarios.loader import load_scenario
 from ..tasks.step import BEGIN, STEP, run_batch
 from ..tasks.task import (
     OUTCOMES,
     TERMS,
-    TaskConfig,
     action_space,
     episode_dtype,
     observation_size,
     observation_space,
     resolve_action,
+    task_config,
     task_record,
     unflatten,
 )
@@ -94,8 +94,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         if not vessels:
             raise ConfigError("vessels: expected at least one vessel")
         self.render_mode = render_mode
-        arguments = {"action": "heading_speed", **task, "reward": dict(reward or {})}
-        config = validate(TaskConfig, Document("environment arguments", arguments))
+        config = task_config({"action": "heading_speed", **task}, reward)
         self.scenario = load_scenario(TRAFFIC if scenario is None else scenario, overrides=overrides)
         self.icebergs = icebergs
         self.possible_agents = [f"ship_{k}" for k in range(agents)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..scenarios.commands import Commands
 from ..scenarios.loader import Source
-from ..tasks.task import TaskConfig, unflatten
+from ..tasks.task import task_config, unflatten
 from .core import Core
 from .notice import compiling
 
@@ -99,11 +99,9 @@ class USVEnv(gym.Env[Any, Any]):
         render_mode: str | None = None,
         **task: Any,
     ) -> None:
-        from ..config import Document, validate
-
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode: expected one of {self.metadata['render_modes']}, got {render_mode!r}")
-        config = validate(TaskConfig, Document("environment arguments", {**task, "reward": dict(reward or {})}))
+        config = task_config(task, reward)
         self.metadata = copy.deepcopy(self.metadata)  # one's own: Gymnasium's wrappers write into it
         self.render_mode = render_mode
         if render_mode == "human":

@@ -12,10 +12,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..config import Document, validate
 from ..scenarios.commands import Commands
 from ..scenarios.loader import Source
-from ..tasks.task import TaskConfig, unflatten
+from ..tasks.task import task_config, unflatten
 from .core import Core, check_difficulty, check_weather, masked
 from .notice import compiling
 from .single import USVEnv
@@ -160,7 +159,7 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
             raise ValueError(f"num_envs: expected a whole number of at least 1, got {num_envs!r}")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode: expected 'rgb_array', got {render_mode!r}")
-        config = validate(TaskConfig, Document("environment arguments", {**task, "reward": dict(reward or {})}))
+        config = task_config(task, reward)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**USVEnv.metadata, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
         self.num_envs = num_envs

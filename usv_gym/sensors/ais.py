@@ -21,7 +21,6 @@ from .noise import noise_slot, pair_slot
 
 NEVER = 1 << 60  #: a tick that does not come
 _SECOND = 1_000_000
-STATIC_INTERVAL_US = 360 * _SECOND  #: type 5 and 24: every six minutes
 ATON_INTERVAL_US = 180 * _SECOND  #: type 21: every three minutes
 _TURNING = 5.0 * DEG_PER_MIN  #: [rad/s] above which a class A station reports at the shorter interval
 

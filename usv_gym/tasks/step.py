@@ -7,13 +7,14 @@ import math
 from ..engine import reset_world, tick_world
 from ..jit import inner, kernel, spliced
 from ..traffic.ships import move_traffic
-from ..trig import PI, clip, wrap
+from ..trig import clip, wrap
+from ..units import DEG
 from ..world.autopilot import autopilot, mix
 from .observe import cross_track_error, observe
-from .task import ACTION_CHANNELS, ACTION_DEMAND, ACTION_DISCRETE
+from .task import ACTION_CHANNELS, ACTION_DEMAND, ACTION_DISCRETE, DISCRETE, HEADING_SPAN
 
-_TURN = PI / 12.0  # of ``discrete``
-_FASTER = 0.125
+_TURN, _FASTER = DISCRETE[2][0] * DEG, DISCRETE[3][1]
+_CHOICES = float(len(DISCRETE))
 
 
 @inner
@@ -76,7 +77,7 @@ def _decode(w, o, task, episode):
         elif action[0] == 4.0:
             episode.speed_ref = max(episode.speed_ref - _FASTER * task.max_speed, 0.0)
     else:
-        episode.heading_ref = wrap(w.nav.mru_heading[o] + 0.5 * PI * clip(action[0], -1.0, 1.0))
+        episode.heading_ref = wrap(w.nav.mru_heading[o] + HEADING_SPAN * clip(action[0], -1.0, 1.0))
         episode.speed_ref = 0.5 * (1.0 + clip(action[1], -1.0, 1.0)) * task.max_speed
     return change / task.channels
 
@@ -170,7 +171,7 @@ def _possible(task, action):
         if not math.isfinite(action[c]):
             return False
     if task.action == ACTION_DISCRETE:
-        return action[0] == math.floor(action[0]) and 0.0 <= action[0] < 5.0
+        return action[0] == math.floor(action[0]) and 0.0 <= action[0] < _CHOICES
     return True
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ..config import Model
+from ..config import Document, Model, validate
 from ..world.state import A
 
 ActionName = Literal["default", "throttle_nozzle", "thrusters", "actuators", "heading_speed", "discrete"]
@@ -86,6 +87,17 @@ class TaskConfig(Model):
     end_on_collision: bool = True
     end_on_arrival: bool = True
     end_out_of_area: bool = True
+
+
+def task_config(arguments: Mapping[str, Any], reward: Mapping[str, float] | None) -> TaskConfig:
+    """The task that keyword arguments of an environment describe.
+
+    Raises
+    ------
+    ConfigError
+        one line for each wrong name or value.
+    """
+    return validate(TaskConfig, Document("environment arguments", {**arguments, "reward": dict(reward or {})}))
 
 
 @dataclass(frozen=True)

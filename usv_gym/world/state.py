@@ -38,7 +38,7 @@ DESCRIPTOR_FIXED, DESCRIPTOR_VESSEL, DESCRIPTOR_LAND = 0, 1, 2
 NX_AIS, NX_SCAN = 12, 9  #: states of the AIS filter and of a radar or LiDAR filter (sensors/tracker.py)
 NP_AIS, NP_SCAN = NX_AIS * (NX_AIS + 1) // 2, NX_SCAN * (NX_SCAN + 1) // 2  #: packed covariances
 
-f8, f4, i8, i4, i2, i1, u8 = np.float64, np.float32, np.int64, np.int32, np.int16, np.int8, np.uint64
+f8, i8, i4, i2, i1, u8 = np.float64, np.int64, np.int32, np.int16, np.int8, np.uint64
 
 
 def _weather() -> Dtype:
