@@ -307,7 +307,7 @@ def validate(
 @app.command("list")
 def list_(
     what: Annotated[
-        str, typer.Argument(help="scenarios, vessels, sensors, policies or environments; default: all")
+        str, typer.Argument(help="scenarios, suites, vessels, sensors, policies or environments; default: all")
     ] = "all",
 ) -> None:
     """List what ships with the package."""
@@ -320,7 +320,7 @@ def list_(
     from .resources import shipped
 
     kinds = {kind: {name: str(read_yaml(path).data.get("description", "")) for name, path in shipped(kind).items()}
-             for kind in ("scenarios", "vessels", "sensors")}  # fmt: skip
+             for kind in ("scenarios", "suites", "vessels", "sensors")}  # fmt: skip
     kinds["policies"] = {name: text for name, (_, text) in POLICIES.items()}
     kinds["policies"][THRUST_LOG] = "a recorded mission, row by row, blind"
     kinds["environments"] = dict.fromkeys(ENVIRONMENTS, "")

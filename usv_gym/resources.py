@@ -15,5 +15,6 @@ def configs() -> Path:
 
 
 def shipped(kind: str) -> dict[str, Path]:
-    """Name -> path of what ships in ``configs/<kind>``, sorted by name."""
-    return {path.stem: path for path in sorted((configs() / kind).glob("*.yaml"))}
+    """Name -> path of what ships in ``configs/<kind>``, sorted by name; in a directory below it: ``directory/name``."""
+    top = configs() / kind
+    return {path.relative_to(top).with_suffix("").as_posix(): path for path in sorted(top.rglob("*.yaml"))}
