@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from usv_gym.config import ConfigError
-from usv_gym.envs.single import OpenSeaEnv, ScenarioEnv
+from usv_gym.envs.single import FamilyEnv, ScenarioEnv
 from usv_gym.world.state import AIS, LIDAR, RADAR
 
 REST = np.array([0.0, -1.0], np.float32)  # of heading_speed: stay where you are
@@ -163,7 +163,7 @@ def test_a_ship_that_falls_silent_is_kept_by_radar_in_range_and_lost_beyond(sea)
 
 # --- ids and errors --------------------------------------------------------------------------------------------------
 def test_what_a_family_draws_has_ids():
-    env = OpenSeaEnv(difficulty=1.0)
+    env = FamilyEnv("open_sea", difficulty=1.0)
     env.reset(seed=0)
     names = env.commands.names
     assert {"own_ship", "ship_1", "obstacle_1"} <= set(names)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 
 import numpy as np
 import pytest
 from gymnasium.utils.seeding import np_random
 
 from usv_gym.envs.core import Core
-from usv_gym.envs.single import OpenSeaEnv
+from usv_gym.envs.single import FamilyEnv
 from usv_gym.replay.archive import load, save
 from usv_gym.run import plan, resimulate, run
 from usv_gym.scenarios.build import build_worlds
@@ -25,9 +24,9 @@ HARD = {
 }
 
 
-def core(num, observation="tracks", source=None, **more):
+def core(num, observation="tracks", source="open_sea", **more):
     config = TaskConfig(observation=observation, end_on_collision=False, end_on_arrival=False)
-    return Core(num, source=source, config=config, **(HARD if source is None else {}), **more)
+    return Core(num, source=source, config=config, **(HARD if source == "open_sea" else {}), **more)
 
 
 def generators(num, first=0):
@@ -81,7 +80,7 @@ def test_another_seed_gives_another_sea_and_other_noise():
 
 
 def test_episodes_of_one_environment_differ():
-    env = OpenSeaEnv()
+    env = FamilyEnv("open_sea")
     first, second = env.reset(seed=0), env.reset()
     assert not np.array_equal(first[0], second[0])
     assert np.array_equal(env.reset(seed=0)[0], first[0])
@@ -96,7 +95,7 @@ def test_a_row_is_the_same_in_a_batch_of_8_of_4_and_alone():
 
 
 def test_the_environment_is_row_0_of_its_core():
-    env = OpenSeaEnv(end_on_collision=False, end_on_arrival=False, **HARD)
+    env = FamilyEnv("open_sea", end_on_collision=False, end_on_arrival=False, **HARD)
     alone = started(1, first=6)
     assert np.array_equal(env.reset(seed=6)[0], alone.obs[0])
     for action in actions(1, 50):
@@ -187,7 +186,9 @@ CROWD = {
 def test_inactive_slots_change_no_bit(monkeypatch):
     given = actions(1, 100)
     small = started(1, source=CROWD)
-    monkeypatch.setattr("usv_gym.envs.core.build_worlds", functools.partial(build_worlds, capacity=(20, 40)))
+    monkeypatch.setattr(
+        "usv_gym.envs.core.build_worlds", lambda scenario, num, capacity: build_worlds(scenario, num, capacity=(20, 40))
+    )
     large = started(1, source=CROWD)
     # slots in use on an axis of this length: of vessels or of obstacles, and of sources
     used = {n: [0, 1, 2] for n in (8, 16, 20, 40)} | {8 + 16: [0, 1, 2, 8, 9, 10], 20 + 40: [0, 1, 2, 20, 21, 22]}

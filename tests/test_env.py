@@ -338,7 +338,7 @@ def test_reset_takes_a_scenario_a_vessel_a_weather_and_a_difficulty():
     env.reset(seed=0, options={"scenario": "calm_crossing"})
     assert env.core.scenario.name == "calm_crossing"
     assert env.world["vessels"]["active"].sum() == 2
-    _, info = env.reset(options={"scenario": None, "vessel": "otter"})
+    _, info = env.reset(options={"scenario": "open_sea", "vessel": "otter"})
     assert env.core.scenario.name == "open_sea"
     assert info["scales"]["length"] == 2.0
     for action in (AHEAD, -AHEAD):  # what an action means does not change with the vessel: throttle and nozzle
@@ -436,7 +436,7 @@ def test_render_gives_a_picture_that_changes():
 
 def test_a_render_mode_that_does_not_exist_is_refused():
     with pytest.raises(ValueError, match="rgb_array"):
-        USVEnv(render_mode="ansi")
+        USVEnv("calm_crossing", render_mode="ansi")
 
 
 def test_render_without_a_mode_says_what_to_do():

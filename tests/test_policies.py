@@ -39,7 +39,7 @@ def off_track(episode, route=ROUTE):
 
 def fly(name, num=60, **arguments):
     """Outcomes of the open seas 0 .. num - 1 with a policy, all in one batch."""
-    core = Core(num, source=None, config=TaskConfig(action="heading_speed", flat=False), **arguments)
+    core = Core(num, source="open_sea", config=TaskConfig(action="heading_speed", flat=False), **arguments)
     core.reset(np.ones(num, bool), [np_random(seed)[0] for seed in range(num)])
     pilots = [make_policy(name) for _ in range(num)]
     for pilot in pilots:

@@ -323,7 +323,7 @@ def list_(
              for kind in ("scenarios", "suites", "vessels", "sensors")}  # fmt: skip
     kinds["policies"] = {name: text for name, (_, text) in POLICIES.items()}
     kinds["policies"][THRUST_LOG] = "a recorded mission, row by row, blind"
-    kinds["environments"] = dict.fromkeys(ENVIRONMENTS, "")
+    kinds["environments"] = {name: text for name, (text, _) in ENVIRONMENTS.items()}
     if what != "all" and what not in kinds:
         raise ConfigError(f"list {what!r}: unknown kind{suggestion(what, [*kinds, 'all'])}")
     table = Table(box=None, show_header=False)

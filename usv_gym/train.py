@@ -48,7 +48,7 @@ class Environment(TaskConfig):
 
     scenario: Any = None
     vessel: str | None = None
-    difficulty: float = 0.5
+    difficulty: float | None = None
     weather: str | dict[str, Any] | None = None
     max_episode_steps: int | None = Field(default=None, ge=1)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import gymnasium as gym
 
-#: id -> entry points of one world and of a batch
-ENVIRONMENTS = {
-    "usv_gym/OpenSea-v0": ("usv_gym.envs.single:OpenSeaEnv", "usv_gym.envs.vector:OpenSeaVectorEnv"),
-    "usv_gym/Scenario-v0": ("usv_gym.envs.single:ScenarioEnv", "usv_gym.envs.vector:ScenarioVectorEnv"),
+#: id -> what it is, and the scenario that it draws its seas from; None: ``scenario=`` is an argument
+ENVIRONMENTS: dict[str, tuple[str, str | None]] = {
+    "usv_gym/OpenSea-v0": ("a new random open sea at every reset: a route, icebergs, crossing ships, weather", "open_sea"),
+    "usv_gym/Scenario-v0": ("a scenario by name, file or mapping", None),
 }
 
 
@@ -16,6 +16,14 @@ def register_all() -> None:
 
     The environments check their own actions, order and episode length, so Gymnasium's per-step wrappers are left out.
     """
-    for name, (one, many) in ENVIRONMENTS.items():
+    for name, (_, sea) in ENVIRONMENTS.items():
         if name not in gym.registry:
-            gym.register(name, one, vector_entry_point=many, order_enforce=False, disable_env_checker=True)
+            kind = "Scenario" if sea is None else "Family"
+            gym.register(
+                name,
+                f"usv_gym.envs.single:{kind}Env",
+                vector_entry_point=f"usv_gym.envs.vector:{kind}VectorEnv",
+                kwargs={} if sea is None else {"sea": sea},
+                order_enforce=False,
+                disable_env_checker=True,
+            )

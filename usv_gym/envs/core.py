@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..config import ConfigError, Document, validate
 from ..scenarios.build import build_worlds, write_weather
-from ..scenarios.families import sample_open_sea
+from ..scenarios.families import FAMILIES
 from ..scenarios.loader import Source, load_scenario
 from ..scenarios.schema import Scenario, Weather
 from ..tasks.step import BEGIN, STEP, observe_batch, run_batch
@@ -34,22 +34,10 @@ from ..tasks.task import (
 )
 from ..units import DEG
 from ..world.disturbance import set_weather
-from ..world.state import A
+from ..world.state import A, capacity
 from ..world.vessel import VesselModel, load_vessel
 from .threads import Crew
 
-#: template of the family ``open_sea``: everything but what the family draws
-OPEN_SEA: dict[str, Any] = {
-    "name": "open_sea",
-    "simulation": {"dt": 0.1, "traffic_interval": 0.5, "control_interval": 1.0, "area": 2000.0},
-    "sensors": {
-        "base": "thesis",
-        # own navigation as often as the tick
-        "navigation": {key: {"rate": 10.0} for key in ("gnss", "mru", "imu", "speed_log", "wind")},
-    },
-}
-#: [m] what a vessel can sail at cruising speed before time is up; the longest route is 1350 m
-OPEN_SEA_REACH = 2500.0
 _OUTCOME_TEXTS = np.array(OUTCOMES, object)
 _WORTH_SHARING = 16  # rows; fewer are done by one thread before another wakes up
 NO_ROWS = np.zeros((0, 0, A, 3))
@@ -75,7 +63,7 @@ class Core:
     num
         B, the number of worlds.
     source
-        scenario name, path or mapping; None: the family ``open_sea``.
+        scenario name, path or mapping.
     config
         the task.
     vessel
@@ -83,10 +71,9 @@ class Core:
     overrides
         ``KEY=VALUE`` strings on the scenario.
     difficulty
-        0 to 1, of the family.
+        0 to 1, of the scenario's family; None: as the scenario says.
     weather
-        ``calm``, ``random``, ``thesis`` or a mapping like ``weather`` of a scenario; None: the scenario's own (the family:
-        ``random``).
+        ``calm``, ``random``, ``thesis`` or a mapping like ``weather`` of a scenario; None: as the scenario says.
     max_steps
         most control steps of an episode; None: as many as the scenario's duration holds.
     num_threads
@@ -104,11 +91,11 @@ class Core:
         self,
         num: int,
         *,
-        source: Source | None,
+        source: Source,
         config: TaskConfig,
         vessel: str | None = None,
         overrides: Sequence[str] = (),
-        difficulty: float = 0.5,
+        difficulty: float | None = None,
         weather: str | Mapping[str, Any] | None = None,
         max_steps: int | None = None,
         num_threads: int = 1,
@@ -116,11 +103,13 @@ class Core:
         self.num = num
         self.config = config
         self.overrides = tuple(overrides)
-        self.difficulty = np.full(num, check_difficulty(difficulty))  # [B]
         self.weather = [check_weather(weather)] * num  # [B]
         self.max_steps = max_steps
         self.crew = Crew(num_threads)
         self._load(source, vessel)
+        if difficulty is None:
+            difficulty = self.scenario.family.difficulty if self.scenario.family else 0.5
+        self.difficulty = np.full(num, check_difficulty(difficulty))  # [B]
         self.observation_space = observation_space(config)
         # one observer per world; the kernel knows of more
         self._obs = np.zeros((num, 1, observation_size(config)), np.float32)
@@ -143,13 +132,10 @@ class Core:
         self._name_views()  # pickle makes arrays of their own of them
 
     # --- set-up ------------------------------------------------------------------------------------------------------
-    def _load(self, source: Source | None, vessel: str | None) -> None:
+    def _load(self, source: Source, vessel: str | None) -> None:
         """(Re)build template and worlds for a scenario; all rows become fresh."""
-        scenario = load_scenario(OPEN_SEA if source is None else source, overrides=self.overrides, vessel=vessel)
+        scenario = load_scenario(source, overrides=self.overrides, vessel=vessel)
         model = load_vessel(scenario.own_ship.vessel)
-        if source is None:
-            time = f"simulation.duration={float(np.ceil(OPEN_SEA_REACH / model.cruise_speed))}"
-            scenario = load_scenario(OPEN_SEA, overrides=(time, *self.overrides), vessel=vessel)
         facts = vessel_facts(model)
         self.config = self.config.model_copy(update={"action": resolve_action(self.config, facts)})
         space = action_space(self.config, facts)
@@ -158,9 +144,13 @@ class Core:
                 f"vessel {model.name!r} has another action space; make the environment with vessel={model.name!r}, "
                 "or with action='throttle_nozzle', 'heading_speed' or 'discrete', which fit every vessel"
             )
-        worlds, names = build_worlds(scenario, self.num)
+        family = FAMILIES[scenario.family.name] if scenario.family else None
+        slots = None if family is None else capacity(
+            max(family.vessels, 1 + len(scenario.ships)), max(family.obstacles, len(scenario.obstacles))
+        )  # fmt: skip
+        worlds, names = build_worlds(scenario, self.num, capacity=slots)
         # nothing is changed until all of it is known to be right
-        self.source, self.vessel, self.scenario, self.model = source, vessel, scenario, model
+        self.source, self.vessel, self.scenario, self.model, self._family = source, vessel, scenario, model, family
         self.worlds, self.names, self.action_space = worlds, names, space
         self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation
@@ -221,8 +211,8 @@ class Core:
             rows[b] = self._template
             self.worlds["seed"][b] = generators[b].integers(0, 1 << 63, dtype=np.uint64)
             self._set_weather(b, generators[b])
-        if self.source is None:
-            sample_open_sea(self.worlds, mask, self.difficulty, self.model.cruise_speed)
+        if self._family is not None:
+            self._family.sample(self.worlds, mask, self.difficulty, self.model, self.scenario)
         self._what[:] = np.where(mask, BEGIN, 0)
         self._run(NO_ROWS)
 
@@ -230,7 +220,7 @@ class Core:
         """Overwrite the weather of row b where the caller or the family asks for it."""
         weather = self.weather[b]
         if weather is None:
-            if self.source is not None or any(o.strip().startswith("weather") for o in self.overrides):
+            if self.scenario.family is None or self.scenario.family.weather == "scenario":
                 return
             weather = "random"
         original = self.scenario.preset == "original"

@@ -20,6 +20,12 @@ from .notice import compiling
 _ONE = np.ones(1, np.bool_)
 
 
+def refuse_scenario(arguments: Mapping[str, Any]) -> None:
+    """ValueError where ``scenario=`` is given to an id that draws its own sea."""
+    if "scenario" in arguments:
+        raise ValueError("this environment draws its own sea; use usv_gym/Scenario-v0 for scenario=")
+
+
 class USVEnv(gym.Env[Any, Any]):
     """An unmanned surface vehicle follows a route through ships and obstacles that it knows from its sensors only.
 
@@ -89,10 +95,10 @@ class USVEnv(gym.Env[Any, Any]):
 
     def __init__(
         self,
-        scenario: Source | None = None,
+        scenario: Source,
         *,
         vessel: str | None = None,
-        difficulty: float = 0.5,
+        difficulty: float | None = None,
         weather: str | Mapping[str, Any] | None = None,
         overrides: Sequence[str] = (),
         reward: Mapping[str, float] | None = None,
@@ -209,15 +215,14 @@ class USVEnv(gym.Env[Any, Any]):
         return self.core.worlds[0]
 
 
-class OpenSeaEnv(USVEnv):
-    """``usv_gym/OpenSea-v0``: a new random open sea at every reset."""
+class FamilyEnv(USVEnv):
+    """An id with a sea of its own, drawn anew at every reset, as ``usv_gym/OpenSea-v0``."""
 
     __doc__ = USVEnv.__doc__
 
-    def __init__(self, **kwargs: Any) -> None:
-        if "scenario" in kwargs:
-            raise ValueError("OpenSea-v0 draws its own sea; use usv_gym/Scenario-v0 for scenario=")
-        super().__init__(None, **kwargs)
+    def __init__(self, sea: str, **kwargs: Any) -> None:
+        refuse_scenario(kwargs)
+        super().__init__(sea, **kwargs)
 
 
 class ScenarioEnv(USVEnv):

@@ -17,7 +17,7 @@ from ..scenarios.loader import Source
 from ..tasks.task import task_config, unflatten
 from .core import Core, check_difficulty, check_weather, masked
 from .notice import compiling
-from .single import USVEnv
+from .single import USVEnv, refuse_scenario
 
 Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
@@ -142,13 +142,13 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
     def __init__(
         self,
         num_envs: int = 1,
-        scenario: Source | None = None,
+        scenario: Source = "busy_open_sea",
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int = 1,
         max_episode_steps: int | None = None,
         vessel: str | None = None,
-        difficulty: float = 0.5,
+        difficulty: float | None = None,
         weather: str | Mapping[str, Any] | None = None,
         overrides: Sequence[str] = (),
         reward: Mapping[str, float] | None = None,
@@ -326,13 +326,12 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         self.core.crew.close()
 
 
-class OpenSeaVectorEnv(USVVectorEnv):
-    """``usv_gym/OpenSea-v0``, ``num_envs`` times: a new random open sea at every reset of a row."""
+class FamilyVectorEnv(USVVectorEnv):
+    """An id with a sea of its own, ``num_envs`` times: a new sea at every reset of a row."""
 
-    def __init__(self, num_envs: int = 1, **kwargs: Any) -> None:
-        if "scenario" in kwargs:
-            raise ValueError("OpenSea-v0 draws its own sea; use usv_gym/Scenario-v0 for scenario=")
-        super().__init__(num_envs, None, **kwargs)
+    def __init__(self, num_envs: int = 1, *, sea: str, **kwargs: Any) -> None:
+        refuse_scenario(kwargs)
+        super().__init__(num_envs, sea, **kwargs)
 
 
 class ScenarioVectorEnv(USVVectorEnv):

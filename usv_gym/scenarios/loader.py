@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any, TypeAlias
 
 from ..config import ConfigError, Document, locate, read_yaml, validate
 from ..world.vessel import load_vessel
+from .families import FAMILIES
 from .schema import DT, Preset, Scenario
 from .thesis_format import convert, kind_of, read_thesis
 
@@ -46,12 +48,20 @@ def load_scenario(
         itself asks for at its own tick (MRU, IMU and wind) pass silently in native scenarios.
     """
     document, has_dynamics_file = _document(source)
-    document = _named_sensors_as_mapping(document).override(overrides)
+    document = _names_as_mappings(document).override(overrides)
     for path, value in ((("own_ship", "vessel"), vessel), (("preset",), preset)):
         if value is not None:
             document = document.replaced(path, value, f"argument {path[-1]}={value!r}")
     scenario = validate(Scenario, document)
     model = load_vessel(scenario.own_ship.vessel)
+    if scenario.family is not None:
+        # what the family would choose, where the file does not
+        if "duration" not in document.data.get("simulation", {}):
+            seconds = float(math.ceil(FAMILIES[scenario.family.name].reach / model.cruise_speed))
+            document = document.replaced(("simulation", "duration"), seconds, "family")
+        if "weather" in document.data and "weather" not in document.data["family"]:
+            document = document.replaced(("family", "weather"), "scenario", "family")
+        scenario = validate(Scenario, document)
     if scenario.own_ship.memory and model.fluid_memory is None:
         raise ConfigError(f"{document.where(('own_ship', 'memory'))}: vessel {model.name!r} has no fluid_memory")
     _warn_of_fast_sensors(scenario, None if has_dynamics_file else Scenario())
@@ -85,14 +95,15 @@ def _converted(document: Document) -> tuple[Document, bool]:
     return document, ("simulation",) in document.origins
 
 
-def _named_sensors_as_mapping(document: Document) -> Document:
-    """``sensors: thesis`` as ``sensors: {base: thesis}``, so that ``sensors.radar.range=500`` can be written there."""
-    sensors = document.data.get("sensors", "thesis")
-    if not isinstance(sensors, str):
-        return document
-    return Document(
-        document.name, {**document.data, "sensors": {"base": sensors}}, document.origins, document.directory
-    )
+def _names_as_mappings(document: Document) -> Document:
+    """``sensors: thesis`` as ``sensors: {base: thesis}``, so that ``sensors.radar.range=500`` can be written there.
+
+    The same for ``family: open_sea`` and ``family.difficulty``.
+    """
+    data = document.data
+    named = {key: {word: data.get(key, default)} for key, word, default in (
+        ("sensors", "base", "thesis"), ("family", "name", None)) if isinstance(data.get(key, default), str)}  # fmt: skip
+    return Document(document.name, {**data, **named}, document.origins, document.directory) if named else document
 
 
 def _warn_of_fast_sensors(scenario: Scenario, usual: Scenario | None) -> None:

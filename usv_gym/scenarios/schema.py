@@ -22,9 +22,10 @@ from pydantic import (
     model_validator,
 )
 
-from ..config import ConfigError, Model, locate, problem
+from ..config import ConfigError, Model, locate, problem, suggestion
 from ..resources import shipped
 from ..units import KNOT, metres_per_degree
+from .families import FAMILIES
 from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
 
 Latitude = Annotated[float, Field(strict=True, ge=-90, le=90)]
@@ -297,6 +298,28 @@ class Obstacle(Model):
     mmsi: Annotated[int, Field(strict=True, ge=992_000_000, le=997_999_999)] | None = None
 
 
+# --- families --------------------------------------------------------------------------------------------------------
+def _family_by_name(value: Any) -> Any:
+    return {"name": value} if isinstance(value, str) else value
+
+
+class Family(Model):
+    """What is drawn anew at every reset, on top of the rest of the scenario."""
+
+    name: str
+    difficulty: Share = Field(default=0.5, description="0 to 1: how much there is, and how near it comes")
+    weather: Literal["random", "scenario"] = Field(
+        default="random", description="drawn by difficulty, or that of the scenario (the rule where one is given)"
+    )
+
+    @field_validator("name")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if value not in FAMILIES:
+            raise problem(f"unknown family {value!r}{suggestion(value, FAMILIES)}")
+        return value
+
+
 # --- scenario --------------------------------------------------------------------------------------------------------
 class Scenario(Model):
     """Everything a world is made of."""
@@ -305,6 +328,9 @@ class Scenario(Model):
     name: str = ""
     description: str = ""
     preset: Preset = Field(default="standard", description="original: constants and quirks of the simulator of 2017")
+    family: Annotated[Family, BeforeValidator(_family_by_name, json_schema_input_type=str | Family)] | None = Field(
+        default=None, description="random family, by name or in full, that is drawn on top of the rest at every reset"
+    )
     origin: Origin = Origin(latitude_deg=59.4377744115633, longitude_deg=10.4716511800410)
     simulation: Simulation = Simulation()
     weather: Weather = Weather()

@@ -1,20 +1,21 @@
-"""Scenario families: random seas, drawn in a kernel on top of a template record.
+"""The thesis's busy open sea (chapter 7) as a random family.
 
-``open_sea`` is the thesis's busy open sea (chapter 7) as a random family: a route of a few legs, icebergs strewn along it, and
-ships timed to meet the own ship on its way.  ``difficulty`` from 0 to 1 scales how many there are and how near they come.
+A route of a few legs, icebergs strewn along it, and ships timed to meet the own ship on its way.  ``difficulty`` from 0 to 1
+scales how many there are and how near they come.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from .. import rng
-from ..jit import inner, kernel, spliced
-from ..trig import PI, atan2, sincos
-from ..units import DEG
-from ..world.state import (
+from ... import rng
+from ...jit import inner, kernel, spliced
+from ...trig import PI, atan2, sincos
+from ...units import DEG
+from ...world.state import (
     AFTER_CONTINUE,
     AFTER_STOP,
     AIS_CLASS_A,
@@ -27,8 +28,10 @@ from ..world.state import (
     KIND_VESSEL,
     MODEL_KINEMATIC,
 )
+from ...world.vessel import VesselModel
+from ..schema import Scenario
 
-#: most that a family puts into one world; fits the smallest capacity class
+#: most that the family puts into one world; fits the smallest capacity class
 MAX_SHIPS, MAX_ICEBERGS = 7, 16
 FIRST_MMSI = 257_000_001
 
@@ -163,8 +166,13 @@ def draw_open_sea(w, difficulty, cruise):
             break
 
 
+def sample(worlds: Any, mask: Any, difficulty: Any, model: VesselModel, scenario: Scenario) -> None:
+    """Draw an open sea into the rows of ``mask`` [B]; see :class:`~usv_gym.scenarios.families.FamilySpec`."""
+    _sample(worlds, mask, difficulty, model.cruise_speed)
+
+
 @kernel
-def sample_open_sea(worlds, mask, difficulty, cruise):
+def _sample(worlds, mask, difficulty, cruise):
     """Draw an open sea into the rows of ``worlds`` [B] where ``mask`` [B] is true; difficulty [B], cruise speed [m/s]."""
     for b in range(worlds.shape[0]):
         if mask[b]:

@@ -1,0 +1,39 @@
+"""Scenario families: random seas, drawn in a kernel on top of a template record.
+
+A scenario with the key ``family`` is the template; at every reset the family draws the rest into the record from the
+world's seed.  A new family is a module with ``sample`` and a row here.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+#: (worlds [B], mask [B], difficulty [B], vessel model of the own ship, scenario): draws into the rows of the mask, which
+#: are fresh copies of the template with their seeds set, before the kernel ``reset_worlds`` starts them
+Sample = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class FamilySpec:
+    """What the rest of the package needs to know of a family."""
+
+    description: str
+    vessels: int  #: most vessel slots it fills, the own ship's among them
+    obstacles: int  #: most obstacle slots it fills
+    reach: float  #: [m] what a vessel can sail at cruising speed before time is up, where the scenario gives no duration
+    module: str  #: below this package; kernels load with the first use
+
+    @property
+    def sample(self) -> Sample:
+        """The function that draws."""
+        sample: Sample = importlib.import_module(f"{__name__}.{self.module}").sample
+        return sample
+
+
+FAMILIES: dict[str, FamilySpec] = {
+    "open_sea": FamilySpec(
+        "icebergs and crossing ships along a route", vessels=8, obstacles=16, reach=2500.0, module="open_sea"
+    ),
+}
