@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from usv_gym.jit import kernel
 from usv_gym.sensors.shadow import cast_shadows, look_around
 from usv_gym.world import geometry
+from usv_gym.world.land import NO_LAND
 from usv_gym.world.safety import sweep
 from usv_gym.world.state import world_dtype
 
@@ -34,7 +35,7 @@ def _pair(n1, e1, p1, l1, b1, n2, e2, p2, l2, b2):
 
 @kernel
 def _sweep(worlds):
-    sweep(worlds[0])
+    sweep(worlds[0], NO_LAND)
 
 
 @kernel

@@ -12,6 +12,7 @@ from usv_gym.engine import reset_worlds
 from usv_gym.scenarios.build import build_worlds
 from usv_gym.scenarios.loader import load_scenario
 from usv_gym.units import DEG, KNOT
+from usv_gym.world.land import NO_LAND
 from usv_gym.world.state import DESCRIPTOR_FIXED, DESCRIPTOR_VESSEL
 
 ROTATION, REPORT = 1.25, 1.0  # s, of the radar and of the TDM
@@ -275,7 +276,7 @@ def test_an_hour_of_the_busy_open_sea_stays_finite():
     B = 10
     worlds, names = build_worlds(load_scenario(keys), B, capacity=(V, 16))
     worlds["seed"] = np.arange(1, B + 1)
-    reset_worlds(worlds, np.ones(B, bool))
+    reset_worlds(worlds, NO_LAND, np.ones(B, bool))
     ships, bergs = [1, 2], [V + i for i, name in enumerate(names[V:]) if name]
     for _ in range(60):
         advance(worlds, 60.0)

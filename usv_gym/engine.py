@@ -20,8 +20,8 @@ from .world.state import MODEL_3DOF
 
 
 @spliced
-def tick_world(w, rows, row):
-    """Advance one world by one tick.
+def tick_world(w, land, rows, row):
+    """Advance one world by one tick; ``land`` is the pool of world/land.py.
 
     ``rows[row]`` [n, A, 3] are commands to plant 0 that arrive within the tick, in order (a thrust log faster than the
     tick); with n = 0 the command in the record holds.
@@ -47,21 +47,21 @@ def tick_world(w, rows, row):
                 wave_step(w, p, j, tick)
             plant_step(w, j, p, w.dt)
     if tick - w.frame_tick >= w.frame_ticks:
-        end_frame(w)
+        end_frame(w, land)
     if tick >= w.next_nav:
         if w.vessels.model[w.observer[0]] != MODEL_3DOF:
             move_traffic(w, tick)  # a kinematic observer is where the traffic is
         navigate(w, tick)
     if tick >= w.next_sense:
         move_traffic(w, tick)
-        sense(w, tick)
+        sense(w, land, tick)
 
 
 @spliced
-def end_frame(w):
+def end_frame(w, land):
     """Close the traffic frame that ends now and decide the next one."""
     move_traffic(w, w.tick)
-    sweep(w)
+    sweep(w, land)
     for o in range(w.observer.shape[0]):
         j = w.observer[o]
         if w.vessels.model[j] == MODEL_3DOF:
@@ -71,14 +71,14 @@ def end_frame(w):
 
 
 @spliced
-def reset_world(w):
+def reset_world(w, land):
     """Bring a freshly written world to tick 0: weather state, first decisions, first navigation, sensor schedule."""
     w.tick = 0
     w.traffic_tick = 0
     weather_reset(w)
     begin_frame(w)
     steer(w, w.frame_ticks * w.dt)
-    sweep(w)
+    sweep(w, land)
     for o in range(w.observer.shape[0]):
         w.safety.step_closest[o] = math.inf
     navigate(w, w.tick)
@@ -86,23 +86,26 @@ def reset_world(w):
 
 
 @kernel
-def reset_worlds(worlds, mask):
-    """Reset the rows of ``worlds`` [B] where ``mask`` [B] is true; the others are not touched."""
+def reset_worlds(worlds, land, mask):
+    """Reset the rows of ``worlds`` [B] where ``mask`` [B] is true; the others are not touched.
+
+    land: the pool that the worlds' ``land_id`` count in (world/land.py; ``NO_LAND`` for the open sea).
+    """
     for b in range(worlds.shape[0]):
         if mask[b]:
-            reset_world(worlds[b])
+            reset_world(worlds[b], land)
 
 
 @kernel
-def advance_worlds(worlds, ticks, rows):
-    """Advance every world by ``ticks``.
+def advance_worlds(worlds, land, ticks, rows):
+    """Advance every world by ``ticks``; ``land`` is the pool of world/land.py.
 
     rows: float64 [ticks, n, A, 3], commands to plant 0 of every world, n of them within each tick; [0, 0, A, 3] to let the
     commands in the records hold.
     """
     for b in range(worlds.shape[0]):
         for k in range(ticks):
-            tick_world(worlds[b], rows, k)
+            tick_world(worlds[b], land, rows, k)
 
 
 @kernel

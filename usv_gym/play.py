@@ -29,7 +29,7 @@ from .world.state import AIS_NONE
 INTERVAL = 0.1  #: [s] control interval, about, when the user steers
 BUDGET = 0.04  #: [s] of real time that a frame may spend on simulating; what does not fit is left out
 ENDINGS = {"collision": "collision", "arrival": "arrived", "out_of_area": "left the area", "time_limit": "time is up",
-           "log_end": "the log is over"}  # fmt: skip
+           "grounding": "aground", "log_end": "the log is over"}  # fmt: skip
 
 
 def plan_by_hand(source: Source, *, vessel: str | None = None, overrides: Sequence[str] = (), seed: int = 0) -> Mission:

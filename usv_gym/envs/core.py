@@ -34,6 +34,7 @@ from ..tasks.task import (
 )
 from ..units import DEG
 from ..world.disturbance import set_weather
+from ..world.land import NO_LAND
 from ..world.state import A, capacity
 from ..world.vessel import VesselModel, load_vessel
 from .threads import Crew
@@ -81,6 +82,7 @@ class Core:
     """
 
     worlds: NDArray[Any]
+    land: NDArray[np.float64]  #: pool of the worlds' land (world/land.py)
     task: NDArray[Any]
     action_space: gym.Space[Any]
     names: list[str]
@@ -152,6 +154,7 @@ class Core:
         # nothing is changed until all of it is known to be right
         self.source, self.vessel, self.scenario, self.model, self._family = source, vessel, scenario, model, family
         self.worlds, self.names, self.action_space = worlds, names, space
+        self.land = NO_LAND
         self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation
         self.control_interval = simulation.control_ticks * simulation.dt
@@ -259,8 +262,8 @@ class Core:
 
     def _run(self, rows: NDArray[np.float64]) -> int:
         if self.crew.size == 1 or np.count_nonzero(self._what) < _WORTH_SHARING or not self._plausible():
-            return int(run_batch(self.worlds, self.task, self._episodes, self._obs, rows))
-        self.crew.share(self.num, lambda part: run_batch(self.worlds[part], self.task, self._episodes[part],
+            return int(run_batch(self.worlds, self.land, self.task, self._episodes, self._obs, rows))
+        self.crew.share(self.num, lambda part: run_batch(self.worlds[part], self.land, self.task, self._episodes[part],
                                                          self._obs[part], rows))  # fmt: skip
         return -1
 
@@ -271,7 +274,7 @@ class Core:
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""
-        observe_batch(self.worlds, self.task, self._obs)
+        observe_batch(self.worlds, self.land, self.task, self._obs)
         return self.obs
 
     def row(self, b: int) -> tuple[NDArray[np.float32], NDArray[np.float64]]:

@@ -309,6 +309,9 @@ def _write_nothing_yet(w: Any) -> None:
     """Values that mean "never" or "unknown" where that is not 0."""
     w["safety"]["distance"] = w["safety"]["closest"] = w["safety"]["step_closest"] = math.inf
     w["safety"]["collided_with"] = -1
+    w["safety"]["land_distance"] = w["safety"]["land_closest"] = math.inf
+    w["land_id"] = w["chart_id"] = w["tracks"]["land_us"] = -1
+    w["tracks"]["land"] = w["picture"]["land"] = w["picture"]["chart"] = math.nan
     w["ais"]["last_tick"] = w["ais"]["due_tick"] = w["ais"]["inbox_stamp_us"] = -1
     w["tracks"]["scan_bias_us"] = w["tracks"]["scan_due"] = -1
     for o, j in enumerate(w["observer"]):

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..config import ConfigError, Document, suggestion, validate
 from ..units import DEG
-from ..world.state import W
+from ..world.state import T, W
 from .build import Names, Worlds, write_obstacle, write_ship
 from .schema import OWN_SHIP, Obstacle, Scenario, Ship
 
@@ -227,7 +227,7 @@ class Commands:
             for name in w[group].dtype.names:
                 array = w[group][name]
                 for axis, size in enumerate(array.shape):
-                    if size == len(self.names):
+                    if size in (len(self.names), len(self.names) + T):  # picture: and stretches of coast
                         array[(slice(None),) * axis + (source,)] = 0
                         break
         w["ais"]["last_tick"][source] = -1

@@ -41,7 +41,7 @@ def _decay(bias, bias_time, seconds):
 
 
 @inner
-def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection):
+def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection):
     t = w.tracks
     own = w.observer[o]
     S = t.id.shape[1]
@@ -106,16 +106,16 @@ def _scan(w, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detect
 
 
 @inner
-def scan_radar(w, o, tick):
+def scan_radar(w, land, o, tick):
     """One revolution of the radar of observer o."""
     p = w.sensors.radar
-    _scan(w, o, RADAR - 1, p, p.range * w.weather.radar_range_factor, tick,
+    _scan(w, land, o, RADAR - 1, p, p.range * w.weather.radar_range_factor, tick,
           rng.RADAR_BIAS, rng.RADAR_NOISE, rng.RADAR_DETECTION)  # fmt: skip
 
 
 @inner
-def scan_lidar(w, o, tick):
+def scan_lidar(w, land, o, tick):
     """One sweep of the LiDAR of observer o."""
     p = w.sensors.lidar
-    _scan(w, o, LIDAR - 1, p, p.range * w.weather.lidar_range_factor, tick,
+    _scan(w, land, o, LIDAR - 1, p, p.range * w.weather.lidar_range_factor, tick,
           rng.LIDAR_BIAS, rng.LIDAR_NOISE, rng.LIDAR_DETECTION)  # fmt: skip

@@ -62,7 +62,7 @@ def _due(tick, dt_us, period_us):
 
 
 @spliced
-def sense(w, tick):
+def sense(w, land, tick):
     """Fire everything that is due at ``tick``: transmissions, receptions, scans, then the TDM's report.
 
     There is room for one message of each source and for one scan under way: what is later than that arrives just before
@@ -93,12 +93,12 @@ def sense(w, tick):
                         take_ais(w, o, s)
             if not make_room:
                 if radar:
-                    scan_radar(w, o, tick)
+                    scan_radar(w, land, o, tick)
                 if lidar:
-                    scan_lidar(w, o, tick)
+                    scan_lidar(w, land, o, tick)
             for k in range(2):
                 fires = radar if k == 0 else lidar
                 deliver(w, o, k, NEVER if make_room and fires else tick)
             if report and not make_room:
-                publish(w, o, tick)
+                publish(w, land, o, tick)
     _set_next(w, tick)

@@ -151,12 +151,12 @@ def take_scan(w, o, k, s, scan):
 
 
 @inner
-def publish(w, o, tick):
+def publish(w, land, o, tick):
     """Write the picture of observer o: every target that a sensor holds, predicted to now and fused."""
     t, pic = w.tracks, w.picture
     now = tick * w.dt_us
     count = 0
-    for s in range(pic.id.shape[1]):
+    for s in range(t.id.shape[1]):
         if t.id[o, s] == 0:
             continue
         if not _drop_silent(w, o, s, now):

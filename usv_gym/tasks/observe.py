@@ -88,12 +88,12 @@ def _keep_nearest(w, found, s, distance, keep):
 
 
 @inner
-def observe(w, o, task, obs):
+def observe(w, land, o, task, obs):
     """Write the flat observation of observer o into obs [size], float32."""
     nav, pic = w.nav, w.picture
     own = w.observer[o]
     V = w.vessels.active.shape[0]
-    S = pic.id.shape[1]
+    S = V + w.obstacles.active.shape[0]
     truth = task.observation == OBS_TRUTH
     if truth:
         north, east, heading = w.vessels.eta[own, 0], w.vessels.eta[own, 1], w.vessels.eta[own, 2]

@@ -31,9 +31,9 @@ def distance_to_go(w, j):
 
 
 @spliced
-def begin_episodes(w, tasks, episodes):
+def begin_episodes(w, land, tasks, episodes):
     """Reset a world and what its observers remember of their episodes."""
-    reset_world(w)
+    reset_world(w, land)
     for o in range(w.observer.shape[0]):
         episode = episodes[o]
         own = w.observer[o]
@@ -113,30 +113,34 @@ def _judge(w, o, task, episode):
     terms[3] = -episode.change
     terms[4] = -1.0
     collision = w.safety.collided_with[o] >= 0
+    grounding = w.safety.grounded[o] != 0
     arrival = r.count[own] > 0 and r.done[own] != 0
     half = w.area[0]
     outside = half > 0.0 and (abs(w.vessels.eta[own, 0]) > half or abs(w.vessels.eta[own, 1]) > half)
     terms[5] = -1.0 if collision and episode.collided == 0 else 0.0
-    terms[6] = 1.0 if arrival and episode.arrived == 0 and not collision else 0.0
+    terms[6] = 1.0 if arrival and episode.arrived == 0 and not (collision or grounding) else 0.0
     terms[7] = -1.0 if outside else 0.0
+    terms[8] = -1.0 if grounding and episode.grounded == 0 else 0.0
     episode.reward = 0.0
     for i in range(terms.shape[0]):
         episode.reward += task.weight[i] * terms[i]
     terminated = (
-        (collision and task.end_on_collision) or (arrival and task.end_on_arrival) or (outside and task.end_out_of_area)
+        ((collision or grounding) and task.end_on_collision)
+        or (arrival and task.end_on_arrival)
+        or (outside and task.end_out_of_area)
     )
     truncated = not terminated and task.max_steps > 0 and episode.step >= task.max_steps
     if terminated or truncated:
-        episode.outcome = 1 if collision else (2 if arrival else (3 if outside else 4))
+        episode.outcome = 1 if collision else (5 if grounding else (2 if arrival else (3 if outside else 4)))
     episode.terminated = terminated
     episode.truncated = truncated
 
 
 @spliced
-def step_task(w, tasks, episodes, rows):
+def step_task(w, land, tasks, episodes, rows):
     """One control step of a world: every observer's action, the ticks, every observer's judgement.
 
-    Observers whose vessel has left the sea do nothing.  A lone observer's step ends where its vessel collides.
+    Observers whose vessel has left the sea do nothing.  A lone observer's step ends where its vessel collides or runs aground.
     """
     O = w.observer.shape[0]
     piloted = tasks[0].action != ACTION_DEMAND and tasks[0].action != ACTION_CHANNELS
@@ -144,6 +148,7 @@ def step_task(w, tasks, episodes, rows):
         own = w.observer[o]
         w.safety.step_closest[o] = math.inf
         episodes[o].collided = w.safety.collided_with[o] >= 0
+        episodes[o].grounded = w.safety.grounded[o]
         episodes[o].arrived = w.routes.done[own] != 0
         if w.vessels.active[own]:
             episodes[o].change = _decode(w, o, tasks[o], episodes[o])
@@ -152,8 +157,8 @@ def step_task(w, tasks, episodes, rows):
             for o in range(O):
                 if w.vessels.active[w.observer[o]]:
                     _pilot(w, o, tasks[o], episodes[o])
-        tick_world(w, rows, k)
-        if O == 1 and tasks[0].end_on_collision and w.safety.collided_with[0] >= 0:
+        tick_world(w, land, rows, k)
+        if O == 1 and tasks[0].end_on_collision and (w.safety.collided_with[0] >= 0 or w.safety.grounded[0]):
             break
     move_traffic(w, w.tick)
     for o in range(O):
@@ -176,11 +181,12 @@ def _possible(task, action):
 
 
 @kernel
-def run_batch(worlds, tasks, episodes, obs, rows):
+def run_batch(worlds, land, tasks, episodes, obs, rows):
     """Begin an episode in the rows that ask for BEGIN, make a control step in those that ask for STEP, leave the others.
 
-    worlds [B]; tasks [O], one per observer; episodes [B, O] with ``what`` (of observer 0) and ``action`` as input and the
-    rest as result; obs [B, O, size] float32, written; rows [ticks, n, A, 3] (see engine.advance_worlds).
+    worlds [B]; land, the pool that their ``land_id`` count in (world/land.py); tasks [O], one per observer; episodes [B, O]
+    with ``what`` (of observer 0) and ``action`` as input and the rest as result; obs [B, O, size] float32, written;
+    rows [ticks, n, A, 3] (see engine.advance_worlds).
     Returns -1, or the first row with an action that is not finite or none of ``discrete``; then nothing at all has moved.
     (One entry point for both, because what they share is then compiled once.)
     """
@@ -193,18 +199,18 @@ def run_batch(worlds, tasks, episodes, obs, rows):
     for b in range(worlds.shape[0]):
         what = episodes[b, 0].what
         if what == BEGIN:
-            begin_episodes(worlds[b], tasks, episodes[b])
+            begin_episodes(worlds[b], land, tasks, episodes[b])
         elif what == STEP:
-            step_task(worlds[b], tasks, episodes[b], rows)
+            step_task(worlds[b], land, tasks, episodes[b], rows)
         if what != 0:
             for o in range(O):
-                observe(worlds[b], o, tasks[o], obs[b, o])
+                observe(worlds[b], land, o, tasks[o], obs[b, o])
     return -1
 
 
 @kernel
-def observe_batch(worlds, tasks, obs):
+def observe_batch(worlds, land, tasks, obs):
     """Write the observations [B, O, size] that the records hold now; reads nothing but navigation and picture."""
     for b in range(worlds.shape[0]):
         for o in range(worlds[b].observer.shape[0]):
-            observe(worlds[b], o, tasks[o], obs[b, o])
+            observe(worlds[b], land, o, tasks[o], obs[b, o])

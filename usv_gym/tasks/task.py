@@ -47,7 +47,7 @@ TARGET_FEATURES = (
 )  # fmt: skip
 N_OWN, N_TARGET = len(OWN_FEATURES), len(TARGET_FEATURES)
 
-TERMS = ("progress", "cross_track", "proximity", "effort", "time", "collision", "arrival", "out_of_area")
+TERMS = ("progress", "cross_track", "proximity", "effort", "time", "collision", "arrival", "out_of_area", "grounding")
 N_TERMS = len(TERMS)
 
 #: effects of the actions of ``discrete``: change of heading [deg], of speed [share of max speed]
@@ -66,6 +66,7 @@ class RewardWeights(Model):
     collision: float = 50.0  #: -1 on first contact
     arrival: float = 20.0  #: +1 when the last waypoint is reached
     out_of_area: float = 20.0  #: -1 when the area is left
+    grounding: float = 50.0  #: -1 when the hull first touches land
 
 
 class TaskConfig(Model):
@@ -84,7 +85,7 @@ class TaskConfig(Model):
     rate_scale: float = Field(default=0.5, gt=0)  #: [rad/s]
     safe_distance: float = Field(default=50.0, gt=0)  #: [m] hull to hull, where the proximity term begins
     reward: RewardWeights = RewardWeights()
-    end_on_collision: bool = True
+    end_on_collision: bool = True  #: or grounding
     end_on_arrival: bool = True
     end_out_of_area: bool = True
 
@@ -134,13 +135,13 @@ def episode_dtype() -> np.dtype[Any]:
         ("step", "i8"), ("to_go", "f8"),  # steps so far; distance to go along the route [m]
         ("heading_ref", "f8"), ("speed_ref", "f8"),  # of heading_speed and discrete
         ("last_action", "f8", (3 * A,)), ("change", "f8"),  # mean squared change of the action in this step
-        ("collided", "i1"), ("arrived", "i1"),  # before this step
+        ("collided", "i1"), ("grounded", "i1"), ("arrived", "i1"),  # before this step
         ("closest", "f8"),  # smallest hull distance to anything since reset [m]
-        ("outcome", "i1"),  # 0 running, 1 collision, 2 arrival, 3 out of area, 4 time limit
+        ("outcome", "i1"),  # 0 running, 1 collision, 2 arrival, 3 out of area, 4 time limit, 5 grounding
     ], align=True)  # fmt: skip
 
 
-OUTCOMES = ("running", "collision", "arrival", "out_of_area", "time_limit")
+OUTCOMES = ("running", "collision", "arrival", "out_of_area", "time_limit", "grounding")
 
 
 def action_channels(name: str, vessel: Vessel) -> list[tuple[int, int]]:

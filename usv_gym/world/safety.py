@@ -99,8 +99,8 @@ def _note(safety, o, s, near, end):
 
 
 @inner
-def sweep(w):
-    """Distances of every observer's hull to every source over the frame that ends now."""
+def sweep(w, land):
+    """Distances of every observer's hull to every source, and to land, over the frame that ends now."""
     v, m, safety = w.vessels, w.obstacles, w.safety
     V = v.active.shape[0]
     for o in range(w.observer.shape[0]):

@@ -6,7 +6,7 @@ known at compile time.
 
 Sizes: B worlds, V vessel slots (slot 0 is the own ship by convention), M obstacle slots, S = V + M sources (a source is
 anything a sensor can see: vessel j is source j, obstacle m is source V + m), O observers, P plants (3-DOF vessels),
-A thrusters per plant, W waypoints per route.
+A thrusters per plant, W waypoints per route, L bearing sectors of land, T stretches of coast.
 
 Units and frames: SI and radians; {n} is the local tangent plane (north, east) at ``origin``; {b} is the body frame
 (forward, starboard).  Times are integers: ticks of ``dt_us``, or microseconds where the name ends in ``_us``.
@@ -23,6 +23,8 @@ Dtype = np.dtype[Any]
 
 A = 4  #: thrusters per plant
 W = 32  #: waypoints per route
+L = 72  #: bearing sectors of land in the picture, clockwise from north: sector i is [5 i, 5 i + 5) deg
+T = 8  #: stretches of coast among the detected targets, in the slots after those of the S sources
 
 # --- codes -----------------------------------------------------------------------------------------------------------
 KIND_SHIP, KIND_VESSEL, KIND_BOAT, KIND_USV = 0, 1, 2, 3
@@ -172,6 +174,8 @@ def _safety(O: int, S: int) -> Dtype:
         ("closest", f8, (O, S)),  # smallest since reset [m]
         ("step_closest", f8, (O,)),  # smallest to anything within the last control step [m]
         ("collided_with", i4, (O,)),  # source index, -1 for none
+        ("land_distance", f8, (O,)), ("land_closest", f8, (O,)),  # hull to land [m]: end of the last frame; since reset
+        ("grounded", i1, (O,)),  # 1 from the first touch of land on
     ], align=True)  # fmt: skip
 
 
@@ -262,22 +266,32 @@ def _tracks(O: int, S: int) -> Dtype:
         ("measured_us", i8, (O, 2, S)),
         ("scan_us", i8, (O, 2)), ("scan_due", i8, (O, 2)),  # stamp of the last scan; tick at which it arrives, -1: did
         ("visible", i1, (O, 2, S)),  # whether the last scan of that sensor could see the source (truth of the sensor)
+        # echoes of land: nearest point N, E [m] {n} in each bearing sector, NaN for none; second axis of 2: the scan under
+        # way, the last that arrived
+        ("land", f8, (O, 2, 2, L, 2)), ("land_us", i8, (O, 2, 2)),  # stamp, -1 for none
     ], align=True)  # fmt: skip
 
 
 def _picture(O: int, S: int) -> Dtype:
-    """Detected targets as the TDM reports them: the only thing a controller gets to see of the surroundings."""
+    """Detected targets as the TDM reports them: the only thing a controller gets to see of the surroundings.
+
+    Slot s is source s; the T slots that follow are stretches of coast.
+    """
+    D = S + T
     return np.dtype([
         ("tick", i8, (O,)), ("sequence", i4, (O,)), ("next_id", i4, (O,)),
         ("count", i4, (O,)),  # how many are valid
-        ("id", i4, (O, S)),  # 0: empty
-        ("descriptor", i1, (O, S)), ("sensors", i1, (O, S)),  # bit 0 AIS, 1 radar, 2 LiDAR
-        ("motion_known", i1, (O, S)),
-        ("position", f8, (O, S, 2)),  # N, E [m] {n}
-        ("cog", f8, (O, S)), ("sog", f8, (O, S)), ("rot", f8, (O, S)),  # [rad], [m/s], [rad/s]; NaN while unknown
-        ("radius", f8, (O, S)),  # apparent radius [m]; NaN while only AIS has seen it
-        ("covariance", f8, (O, S, 5)),  # of N, NE, E [m2], variance of cog [rad2] and sog [m2/s2]
-        ("radius_variance", f8, (O, S)),
+        ("id", i4, (O, D)),  # 0: empty
+        ("descriptor", i1, (O, D)), ("sensors", i1, (O, D)),  # bit 0 AIS, 1 radar, 2 LiDAR
+        ("motion_known", i1, (O, D)),
+        ("position", f8, (O, D, 2)),  # N, E [m] {n}
+        ("cog", f8, (O, D)), ("sog", f8, (O, D)), ("rot", f8, (O, D)),  # [rad], [m/s], [rad/s]; NaN while unknown
+        ("radius", f8, (O, D)),  # apparent radius [m]; NaN while only AIS has seen it
+        ("covariance", f8, (O, D, 5)),  # of N, NE, E [m2], variance of cog [rad2] and sog [m2/s2]
+        ("radius_variance", f8, (O, D)),
+        # nearest land per bearing sector, N, E [m] {n}, NaN for none: as radar and LiDAR echo it, and as the chart has it
+        # around the measured own position
+        ("land", f8, (O, L, 2)), ("land_sensors", i1, (O, L)), ("chart", f8, (O, L, 2)),
     ], align=True)  # fmt: skip
 
 
@@ -294,6 +308,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("seed", u8),
         ("origin", f8, (2,)), ("metres_per_degree", f8, (2,)),  # latitude, longitude [deg]; [m/deg]
         ("epoch_us", i8),  # UTC of tick 0
+        ("land_id", i4), ("chart_id", i4),  # coast in the pool of land, true and charted; -1: none (world/land.py)
         ("area", f8, (2,)),  # centre-free bound: out of area when |N - N0| or |E - E0| exceeds it; [0] half size, 0: none
         ("weather", _weather()),
         ("vessels", _vessels(V)), ("plants", _plants(P)), ("routes", _routes(V)), ("obstacles", _obstacles(M)),
