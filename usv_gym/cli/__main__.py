@@ -1,0 +1,5 @@
+"""``python -m usv_gym.cli``."""
+
+from . import main
+
+main()
