@@ -14,7 +14,6 @@ from gymnasium.error import DependencyNotInstalled
 from usv_gym.render import canvas, compose, shapes
 from usv_gym.render.labels import Request, place
 from usv_gym.render.palette import PALETTES, STYLES
-from usv_gym.render.panel import closest_approach
 from usv_gym.render.primitives import Circle, Dots, Label, Polygon, Polyline
 from usv_gym.render.pygame_view import View, render, save_png
 from usv_gym.render.scene import History, scene_from_episode, scene_from_snapshot, sea_from_record
@@ -174,7 +173,7 @@ def test_target_table_by_hand():
     assert (fixed.id, fixed.type, fixed.sensors) == ("T09", "fixed", "RL")
     assert fixed.bearing == pytest.approx(math.degrees(math.atan2(-40.0, 100.0)) % 360.0)
     assert (fixed.cpa, fixed.tcpa) == (pytest.approx(40.0), pytest.approx(20.0))
-    assert (ship.id, ship.type, ship.sensors) == ("T07", "vessel", "AR")
+    assert (ship.id, ship.type, ship.encounter, ship.sensors) == ("T07", "vessel", "GW", "AR")  # it is to starboard
     assert (ship.bearing, ship.range) == (pytest.approx(45.0), pytest.approx(300.0 * math.sqrt(2.0)))
     assert (ship.cpa, ship.tcpa) == (pytest.approx(0.0, abs=1e-6), pytest.approx(60.0))
 
@@ -187,8 +186,23 @@ def test_a_vessel_of_unknown_motion_has_no_cpa():
     assert math.isnan(row.tcpa)
 
 
-def test_closest_approach_without_relative_motion():
-    assert closest_approach(3.0, 4.0, 0.0, 0.0) == (5.0, 0.0)
+def test_a_target_at_rest_relative_to_us_is_as_near_as_it_will_be():
+    w = a_world()[0]
+    w["vessels"]["velocity"][0] = 0.0
+    detect(w, V, id=9, descriptor=state.DESCRIPTOR_FIXED, position=(100.0, -40.0), sensors=0b110)
+    row = scene_from_snapshot(w).panel.targets[0]
+    assert (row.cpa, row.tcpa) == (pytest.approx(math.hypot(100.0, 40.0)), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("position", "cog_deg", "sog", "encounter"),
+    [((600.0, 0.0), 180.0, 5.0, "HO"), ((300.0, -300.0), 90.0, 5.0, "SO"), ((300.0, 0.0), 0.0, 2.0, "OT"),
+     ((-300.0, 0.0), 0.0, 9.0, "OV"), ((300.0, 0.0), 0.0, 9.0, "")],
+)  # fmt: skip
+def test_the_table_names_the_encounter(position, cog_deg, sog, encounter):
+    w = a_world()[0]
+    detect(w, 1, descriptor=state.DESCRIPTOR_VESSEL, position=position, cog=math.radians(cog_deg), sog=sog)
+    assert scene_from_snapshot(w).panel.targets[0].encounter == encounter
 
 
 def test_gauges():

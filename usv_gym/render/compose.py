@@ -9,7 +9,7 @@ import numpy as np
 
 from ..units import DEG, KNOT, wrap_360
 from . import shapes
-from .panel import clock, target_name, target_row
+from .panel import clock, target_name, target_rows, velocity_of
 from .primitives import LAYERS, Circle, Dots, Label, Panel, Points, Polygon, Polyline, Primitive, Scene
 from .sea import DESCRIPTORS, HULLS, OBSTACLES, Detection, Sea, Trail
 
@@ -223,15 +223,13 @@ def _own(layers: Layers, sea: Sea) -> None:
 
 def _forecast(layers: Layers, sea: Sea) -> None:
     """Where own ship and target will be when they are closest, for the target that the picture says comes closest."""
-    best = min(((row.cpa, row.tcpa, d) for d, row in ((d, target_row(sea, d)) for d in sea.detections)
+    best = min(((row.cpa, row.tcpa, d) for d, row in zip(sea.detections, target_rows(sea), strict=True)
                 if 1.0 < row.tcpa < CPA_SECONDS and row.cpa < CPA_METRES), key=lambda b: b[:2], default=None)  # fmt: skip
     if best is None:
         return
     cpa, tcpa, d = best
     own = np.add(sea.here, tcpa * sea.velocity[sea.own])
-    target = np.array(d.position)
-    if d.motion_known and math.isfinite(d.sog) and math.isfinite(d.cog):
-        target = target + tcpa * d.sog * np.array([math.cos(d.cog), math.sin(d.cog)])
+    target = np.add(d.position, np.multiply(tcpa, velocity_of(d) or (0.0, 0.0)))
     layers["symbols"] += [Polyline(np.array([own, target]), "cpa"), Dots(np.array([own, target]), "cpa_dot", 5.0)]
     middle = 0.5 * (own + target)
     text = f"CPA {target_name(d)} {cpa:.0f} m in {clock(tcpa)}"
@@ -268,9 +266,9 @@ def _detection(layers: Layers, d: Detection) -> None:
     if math.isfinite(nn) and math.isfinite(ne) and math.isfinite(ee):
         outline = shapes.covariance_ellipse(d.position, nn, ne, ee)
         layer.append(Polyline(np.vstack((outline, outline[:1])), "covariance"))
-    if d.is_vessel and d.motion_known and math.isfinite(d.sog) and math.isfinite(d.cog):
-        velocity = d.sog * np.array([math.cos(d.cog), math.sin(d.cog)])
-        _vector(layers["symbols"], d.position, velocity, "detection_vector")
+    velocity = velocity_of(d)
+    if d.is_vessel and velocity is not None:
+        _vector(layers["symbols"], d.position, np.array(velocity), "detection_vector")
 
 
 def _labels(layer: list[Primitive], sea: Sea) -> None:

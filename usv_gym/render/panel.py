@@ -7,38 +7,50 @@ import math
 import numpy as np
 
 from ..units import DEG, DEG_PER_MIN, KNOT, wrap_360
+from ..world.encounter import Encounter, encounters
 from .primitives import Panel, Plot, Points, Series, TargetRow
 from .sea import DESCRIPTORS, Detection, Sea
 
-
-def closest_approach(dn: float, de: float, dvn: float, dve: float) -> tuple[float, float]:
-    """Distance [m] and time [s] of the closest approach of a target at (dn, de) that moves at (dvn, dve) relatively.
-
-    A time below zero has passed already; without relative motion it is zero.
-    """
-    v2 = dvn * dvn + dve * dve
-    t = -(dn * dvn + de * dve) / v2 if v2 > 1e-12 else 0.0
-    return math.hypot(dn + dvn * t, de + dve * t), t
+#: what a target is to the own ship, in two letters
+ENCOUNTERS = {
+    Encounter.SAFE: "", Encounter.HEAD_ON: "HO", Encounter.CROSSING_GIVE_WAY: "GW", Encounter.CROSSING_STAND_ON: "SO",
+    Encounter.OVERTAKING: "OT", Encounter.OVERTAKEN: "OV",
+}  # fmt: skip
 
 
-def target_row(sea: Sea, d: Detection) -> TargetRow:
-    """Row of one detected target, seen from the own ship: what the picture says, not what is true."""
-    dn, de = d.position[0] - sea.here[0], d.position[1] - sea.here[1]
-    moving = d.motion_known and math.isfinite(d.sog) and math.isfinite(d.cog)
-    cpa = tcpa = math.nan
-    if moving or not d.is_vessel:
-        vn, ve = (d.sog * math.cos(d.cog), d.sog * math.sin(d.cog)) if moving else (0.0, 0.0)
-        own = sea.velocity[sea.own]
-        cpa, tcpa = closest_approach(dn, de, vn - float(own[0]), ve - float(own[1]))
-    return TargetRow(
-        id=target_name(d),
-        type=DESCRIPTORS.get(d.descriptor, "?"),
-        bearing=wrap_360(math.atan2(de, dn) / DEG),
-        range=math.hypot(dn, de),
-        cpa=cpa,
-        tcpa=tcpa,
-        sensors=d.sensor_letters,
-    )
+def target_rows(sea: Sea) -> list[TargetRow]:
+    """Rows of the detected targets, seen from the own ship: what the picture says, not what is true [one per detection]."""
+    n = len(sea.detections)
+    others = np.zeros((1, n, 4))
+    for i, d in enumerate(sea.detections):
+        others[0, i] = *d.position, *(velocity_of(d) or (0.0, 0.0))
+    codes, distances, times = np.zeros((1, n), np.int64), np.zeros((1, n)), np.zeros((1, n))
+    encounters(np.array([[*sea.here, *sea.velocity[sea.own]]]), others, codes, distances, times)
+    rows = []
+    for i, d in enumerate(sea.detections):
+        dn, de = others[0, i, :2] - sea.here
+        moving = velocity_of(d) is not None
+        known = moving or not d.is_vessel  # of a vessel whose motion is not known nothing can be foretold
+        rows.append(
+            TargetRow(
+                id=target_name(d),
+                type=DESCRIPTORS.get(d.descriptor, "?"),
+                encounter=ENCOUNTERS[Encounter(codes[0, i])] if moving else "",
+                bearing=wrap_360(math.atan2(de, dn) / DEG),
+                range=math.hypot(dn, de),
+                cpa=float(distances[0, i]) if known else math.nan,
+                tcpa=float(times[0, i]) if known else math.nan,
+                sensors=d.sensor_letters,
+            )
+        )
+    return rows
+
+
+def velocity_of(d: Detection) -> tuple[float, float] | None:
+    """Velocity [m/s] {n} of a detected target; None while its motion is unknown."""
+    if not (d.motion_known and math.isfinite(d.sog) and math.isfinite(d.cog)):
+        return None
+    return d.sog * math.cos(d.cog), d.sog * math.sin(d.cog)
 
 
 def target_name(d: Detection) -> str:
@@ -83,7 +95,7 @@ def plots(t: Points, speed: Points, heading: Points, closest: Points, marker: fl
 
 def panel(sea: Sea, status: tuple[str, ...], curves: tuple[Plot, ...]) -> Panel:
     """The whole panel of one instant."""
-    rows = sorted((target_row(sea, d) for d in sea.detections), key=lambda row: row.range)
+    rows = sorted(target_rows(sea), key=lambda row: row.range)
     return Panel(status=status, gauges=gauges(sea), targets=tuple(rows), plots=curves)
 
 

@@ -17,8 +17,8 @@ ROW = 20.0  #: [px] height of a row of the table
 LEAST = 3  #: rows of the table that are worth more than a plot
 PLOT = 112.0  #: [px] least height of a plot
 #: columns of the table: title, offset from the left, alignment
-COLUMNS = (("ID", 0.0, 0.0), ("TYPE", 44.0, 0.0), ("BRG", 138.0, 1.0), ("RNG m", 194.0, 1.0), ("CPA m", 244.0, 1.0),
-           ("TCPA s", 298.0, 1.0), ("BY", 310.0, 0.0))  # fmt: skip
+COLUMNS = (("ID", 0.0, 0.0), ("TYPE", 36.0, 0.0), ("ENC", 82.0, 0.0), ("BRG", 142.0, 1.0), ("RNG m", 194.0, 1.0),
+           ("CPA m", 244.0, 1.0), ("TCPA s", 298.0, 1.0), ("BY", 310.0, 0.0))  # fmt: skip
 
 
 def draw_panel(canvas: Canvas, panel: Panel, box: tuple[float, float, float, float]) -> None:
@@ -86,7 +86,7 @@ def _cells(row: TargetRow) -> tuple[str, ...]:
         return f"{value:.0f}" if math.isfinite(value) else "-"
 
     tcpa = number(row.tcpa) if row.tcpa >= 0.0 else "past" if row.tcpa < 0.0 else "-"
-    return row.id, row.type, f"{round(row.bearing) % 360:03d}°", number(row.range), number(row.cpa), tcpa
+    return row.id, row.type, row.encounter or "-", f"{round(row.bearing) % 360:03d}°", number(row.range), number(row.cpa), tcpa
 
 
 def _chip(canvas: Canvas, letter: str, on: bool, x: float, y: float) -> None:

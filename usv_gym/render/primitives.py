@@ -105,6 +105,7 @@ class TargetRow:
 
     id: str
     type: str
+    encounter: str  # HO, GW, SO, OT, OV as COLREGs see it by its motion; empty if none or unknown
     bearing: float  # true, [deg]
     range: float  # [m]
     cpa: float
