@@ -64,7 +64,7 @@ def end_frame(w, land):
     sweep(w, land)
     for o in range(w.observer.shape[0]):
         j = w.observer[o]
-        if w.vessels.model[j] == MODEL_3DOF:
+        if w.vessels.model[j] == MODEL_3DOF or w.vessels.controlled[j]:
             follow_route(w, j)
     begin_frame(w)
     steer(w, w.frame_ticks * w.dt)

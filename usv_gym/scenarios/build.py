@@ -12,7 +12,7 @@ from ..config import ConfigError
 from ..units import DEG, DEG_PER_MIN, KNOT, metres_per_degree
 from ..world import state
 from ..world.disturbance import set_weather
-from ..world.vessel import VesselModel, load_vessel, write_plant
+from ..world.vessel import KinematicModel, VesselModel, load_vessel, write_kinematic, write_plant
 from .schema import OWN_SHIP, GeoPoint, Preset, Scenario, Weather
 from .sensor_schema import Error, Lidar, Radar, Sensors
 
@@ -149,17 +149,26 @@ def _reverse(from_deg: float) -> float:
 
 def _write_own_ship(scenario: Scenario, worlds: Worlds, b: int, mmsi: int) -> None:
     own = scenario.own_ship
-    model = load_vessel(own.vessel)
-    write_plant(model, worlds, b, 0, preset=scenario.preset, memory=own.memory)
+    _write_vessel(load_vessel(own.vessel), worlds, b, 0, scenario.preset, own.memory)
     w: Any = worlds[b]
     v = w["vessels"]
-    v["kind"][0], v["model"][0], v["plant"][0] = state.KIND_USV, state.MODEL_3DOF, 0
-    v["behaviour"][0], v["controlled"][0] = state.BEHAVIOUR_HOLD, 1
-    v["length"][0], v["beam"][0] = model.length, model.beam
     _write_motion(v, 0, scenario.local(own.position), own.heading_deg * DEG, own.speed)
     _write_station(v, 0, mmsi, _AIS[own.ais])
     if own.route:  # the start is waypoint 0, so that the first leg has a direction
         _write_route(scenario, w["routes"], 0, (own.position, *own.route), own.acceptance_radius, state.AFTER_STOP)
+
+
+def _write_vessel(model: VesselModel, worlds: Worlds, b: int, j: int, preset: Preset, memory: bool) -> None:
+    """Write a controlled vessel into vessel slot j; plant j is its own, if it has one."""
+    w: Any = worlds[b]
+    v = w["vessels"]
+    if isinstance(model, KinematicModel):
+        write_kinematic(model, v, j, float(w["frame_ticks"] * w["dt"]))
+    else:
+        write_plant(model, worlds, b, j, preset=preset, memory=memory)
+        v["model"][j], v["plant"][j] = state.MODEL_3DOF, j
+    v["kind"][j], v["behaviour"][j], v["controlled"][j] = state.KIND_USV, state.BEHAVIOUR_HOLD, 1
+    v["length"][j], v["beam"][j] = model.length, model.beam
 
 
 def write_agent(
@@ -172,16 +181,13 @@ def write_agent(
     preset: Preset = "standard",
     acceptance_radius: float = 25.0,
 ) -> None:
-    """Put a 3-DOF vessel with plant j and AIS class A into vessel slot j, at cruising speed along a route.
+    """Put a controlled vessel with AIS class A into vessel slot j, at cruising speed along a route; plant j is its own.
 
     ``route`` are two or more places [north, east] of the origin [m]; the first is where it starts.
     """
-    write_plant(model, worlds, b, j, preset=preset)
+    _write_vessel(model, worlds, b, j, preset, memory=False)
     w: Any = worlds[b]
     v, routes = w["vessels"], w["routes"]
-    v["kind"][j], v["model"][j], v["plant"][j] = state.KIND_USV, state.MODEL_3DOF, j
-    v["behaviour"][j], v["controlled"][j] = state.BEHAVIOUR_HOLD, 1
-    v["length"][j], v["beam"][j] = model.length, model.beam
     heading = math.atan2(route[1][1] - route[0][1], route[1][0] - route[0][0])
     _write_motion(v, j, route[0], heading, model.cruise_speed)
     v["frame_eta"][j] = v["eta"][j]
@@ -199,14 +205,13 @@ def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int) -> None
     v = w["vessels"]
     v["kind"][j], v["model"][j], v["plant"][j] = _SHIP_KINDS[ship.class_], state.MODEL_KINEMATIC, -1
     v["behaviour"][j] = state.BEHAVIOUR_WAYPOINTS
-    v["length"][j], v["beam"][j], v["speed"][j] = ship.length, ship.beam, ship.set_speed
+    v["length"][j], v["beam"][j] = ship.length, ship.beam
     v["turn_time"][j], v["turn_rate_max"][j] = ship.turn_time, ship.turn_rate(scenario.preset) * DEG
     frame = scenario.simulation.frame_ticks * scenario.simulation.dt
     v["turn_decay"][j] = -math.expm1(-frame / ship.turn_time)
     v["turn_constant"][j] = ship.turns_constantly(scenario.preset)
     start, following = (scenario.local(place) for place in ship.waypoints[:2])
     heading = math.atan2(following[1] - start[1], following[0] - start[0])
-    v["heading_set"][j] = heading
     _write_motion(v, j, start, heading, ship.set_speed)
     _write_station(v, j, mmsi, _AIS[ship.ais_class])
     _write_route(scenario, w["routes"], j, ship.waypoints, ship.acceptance_radius, _AFTER[ship.after_last])
@@ -215,7 +220,8 @@ def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int) -> None
 def _write_motion(v: Any, j: int, start: tuple[float, float], heading: float, speed: float) -> None:
     v["active"][j] = 1
     v["eta"][j] = *start, heading
-    v["nu"][j, 0] = speed
+    v["heading_set"][j] = heading
+    v["nu"][j, 0] = v["speed"][j] = speed
     v["velocity"][j] = speed * math.cos(heading), speed * math.sin(heading)
 
 

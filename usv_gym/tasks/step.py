@@ -84,8 +84,13 @@ def _decode(w, o, task, episode):
 
 @inner
 def _pilot(w, o, task, episode):
-    """Let the autopilot of observer o's plant follow the references, from what it measures."""
-    p = w.vessels.plant[w.observer[o]]
+    """Let the autopilot of observer o's plant follow the references, from what it measures; a kinematic ship takes them."""
+    j = w.observer[o]
+    p = w.vessels.plant[j]
+    if p < 0:
+        w.vessels.heading_set[j] = episode.heading_ref
+        w.vessels.speed[j] = episode.speed_ref
+        return
     surge, yaw = autopilot(w, p, w.nav.mru_heading[o], w.nav.yaw_rate[o], w.nav.water_speed[o, 0],
                            episode.heading_ref, episode.speed_ref, w.dt)  # fmt: skip
     mix(w, p, surge, yaw)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ..config import Document, Model, validate
+from ..config import ConfigError, Document, Model, validate
 from ..world.state import A
 
 ActionName = Literal["default", "throttle_nozzle", "thrusters", "actuators", "heading_speed", "discrete"]
@@ -158,8 +158,17 @@ def action_channels(name: str, vessel: Vessel) -> list[tuple[int, int]]:
 
 
 def resolve_action(config: TaskConfig, vessel: Vessel) -> str:
-    """The action's name, with ``default`` replaced by the vessel's own."""
-    return vessel.default_action if config.action == "default" else config.action
+    """The action's name, with ``default`` replaced by the vessel's own.
+
+    Raises
+    ------
+    ConfigError
+        for an action on thrusters of a vessel that has none.
+    """
+    name = vessel.default_action if config.action == "default" else config.action
+    if vessel.thrusters == 0 and name not in ("heading_speed", "discrete"):
+        raise ConfigError(f"action {name!r}: a kinematic vessel has no thrusters; expected 'heading_speed' or 'discrete'")
+    return name
 
 
 def task_record(config: TaskConfig, vessel: Vessel, control_ticks: int, max_steps: int) -> NDArray[Any]:

@@ -66,6 +66,7 @@ def steer(w, seconds):
             turn = 0.0 if abs(error) < DEAD_BAND else clip(error, -limit, limit)
         else:
             turn = clip(error * v.turn_decay[j], -limit, limit)
+        speed += v.speed_hold[j] * (v.nu[j, 0] - speed)
         if speed == 0.0:
             turn = 0.0
         s, c = sincos(psi + 0.5 * turn)

@@ -138,6 +138,7 @@ def _vessels(V: int) -> Dtype:
         ("length", f8, (V,)), ("beam", f8, (V,)),  # [m]
         ("speed", f8, (V,)),  # set speed of kinematic ships [m/s]
         ("heading_set", f8, (V,)),  # commanded heading of controlled kinematic ships [rad]
+        ("speed_hold", f8, (V,)),  # share of the speed error that is left after a frame, exp(-frame/T); 0: none
         ("turn_time", f8, (V,)), ("turn_rate_max", f8, (V,)), ("turn_decay", f8, (V,)),  # [s], [rad/s], 1 - exp(-frame/T)
         ("turn_constant", i1, (V,)),  # 1: turn at turn_rate_max with a dead band of 2 deg (the original)
         ("distance", f8, (V,)),  # sailed [m]

@@ -1,17 +1,22 @@
-"""Vessel files: what a 3-DOF plant is made of, read from ``configs/vessels`` and written into a world record."""
+"""Vessel files: what a controlled vessel is made of, read from ``configs/vessels`` and written into a world record.
+
+``model`` says which kind of file it is: a 3-DOF plant with thrusters (the default), or a ``kinematic`` ship that turns and
+changes speed as traffic does, without forces.
+"""
 
 from __future__ import annotations
 
 import functools
+import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..config import ConfigError, Model, locate, read_yaml, validate
+from ..config import ConfigError, Model, locate, problem, read_yaml, suggestion, validate
 from ..units import DEG
-from .state import A
+from .state import MODEL_KINEMATIC, A
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -163,18 +168,46 @@ class Autopilot(Model):
     speed_curve_exponent: Positive
 
 
-class VesselModel(Model):
-    """A vessel file.  Lengths in metres, speeds in metres per second, body axes forward and starboard."""
+class VesselFile(Model):
+    """What every vessel file says.  Lengths in metres, speeds in metres per second, body axes forward and starboard."""
 
     name: str
     description: str
     source: str
     length: Positive
     beam: Positive
-    length_pp: Positive
-    default_action: Literal["throttle_nozzle", "thrusters"]
     cruise_speed: Positive
     max_speed: Positive
+
+    @model_validator(mode="after")
+    def _cruises_within_its_speed(self) -> Self:
+        if self.cruise_speed > self.max_speed:
+            raise problem(f"expected at most max_speed ({self.max_speed:g}), got {self.cruise_speed:g}", "cruise_speed")
+        return self
+
+
+class KinematicModel(VesselFile):
+    """A ship without forces: heading through a low-pass filter with a largest rate (thesis 6.2.2), speed through another.
+
+    Wind, waves and current do not move it, as they do not move the traffic.
+    """
+
+    model: Literal["kinematic"]
+    default_action: Literal["heading_speed", "discrete"] = "heading_speed"
+    turn_time: Positive = Field(description="time constant of the heading filter [s]")
+    max_turn_rate_deg: Positive = Field(description="[deg/s]")
+    speed_time: NonNegative = Field(default=0.0, description="time constant of the speed [s]; 0: at once")
+
+    thrusters: ClassVar[tuple[Thruster, ...]] = ()
+    fluid_memory: ClassVar[None] = None
+
+
+class PlantModel(VesselFile):
+    """A vessel of three degrees of freedom, with its actuators."""
+
+    model: Literal["3dof"] = "3dof"
+    length_pp: Positive
+    default_action: Literal["throttle_nozzle", "thrusters"]
     mass: Mass
     coriolis: Coriolis
     damping: Damping
@@ -196,6 +229,9 @@ class VesselModel(Model):
         return float(m[0, 0]), float(m[1, 1]), float(m[1, 2])
 
 
+VesselModel: TypeAlias = PlantModel | KinematicModel
+
+
 def load_vessel(name_or_path: str | Path) -> VesselModel:
     """Read a vessel by the name of a shipped file (``"odin"``) or by path.
 
@@ -211,11 +247,24 @@ def load_vessel(name_or_path: str | Path) -> VesselModel:
 @functools.lru_cache(maxsize=32)
 def _load(path: Path, modified: int) -> VesselModel:
     """Read a vessel file once for as long as it does not change."""
-    return validate(VesselModel, read_yaml(path))
+    document = read_yaml(path)
+    models: dict[Any, type[PlantModel] | type[KinematicModel]] = {"3dof": PlantModel, "kinematic": KinematicModel}
+    kind = document.data.get("model", "3dof")
+    if not isinstance(kind, str) or kind not in models:
+        raise ConfigError(f"{document.where(('model',))}: unknown model {kind!r}{suggestion(kind, models)}")
+    return validate(models[kind], document)
+
+
+def write_kinematic(model: KinematicModel, v: Any, j: int, frame: float) -> None:
+    """Write how a kinematic vessel moves into slot j of the vessels group ``v`` of a record; ``frame`` seconds per frame."""
+    v["model"][j], v["plant"][j] = MODEL_KINEMATIC, -1
+    v["turn_time"][j], v["turn_rate_max"][j] = model.turn_time, model.max_turn_rate_deg * DEG
+    v["turn_decay"][j] = -math.expm1(-frame / model.turn_time)
+    v["speed_hold"][j] = math.exp(-frame / model.speed_time) if model.speed_time > 0.0 else 0.0
 
 
 def write_plant(
-    model: VesselModel,
+    model: PlantModel,
     worlds: np.ndarray[Any, Any],
     b: int,
     p: int,
