@@ -77,7 +77,8 @@ def test_is_an_own_ship_like_any_other(action):
 
 def test_sails_its_route_sees_the_traffic_and_is_recorded():
     ferry = {"class": "vessel", "speed": 3, "waypoints": [[700, 700], [700, -700]], "after_last": "continue"}
-    mission = plan({**SEA, "sensors": {"base": "thesis", "navigation": NAVIGATION}, "ships": {"ferry": ferry}}, policy="waypoints", seed=3)
+    sensors = {"base": "thesis", "navigation": NAVIGATION}
+    mission = plan({**SEA, "sensors": sensors, "ships": {"ferry": ferry}}, policy="waypoints", seed=3)
     episode = run(mission)
     assert episode.meta["outcome"]["outcome"] == "arrival"
     assert episode.t[-1] == pytest.approx(1450 / KN12, rel=0.03)
