@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..units import DEG, DEG_PER_MIN, KNOT, metres_per_degree
 from ..world import state
 from ..world.disturbance import set_weather
 from ..world.vessel import KinematicModel, VesselModel, load_vessel, write_kinematic, write_plant
+from .behaviours import write_behaviour
 from .schema import OWN_SHIP, GeoPoint, Preset, Scenario, Weather
 from .sensor_schema import Error, Lidar, Radar, Sensors
 
@@ -114,8 +115,9 @@ def write_world(
     mmsis = scenario.mmsis()
     if not agents:
         _write_own_ship(scenario, worlds, b, mmsis[OWN_SHIP])
-    for j, name in enumerate(scenario.ships, start=first):
-        write_ship(scenario, w, j, name, mmsis[name])
+    slots = {OWN_SHIP: 0} | {name: j for j, name in enumerate(scenario.ships, start=first)}
+    for name in scenario.ships:
+        write_ship(scenario, w, slots[name], name, mmsis[name], slots)
     for i, name in enumerate(scenario.obstacles):
         write_obstacle(scenario, w, i, name, mmsis[name])
     for group, frame, now in (("vessels", "frame_eta", "eta"), ("obstacles", "frame_position", "position")):
@@ -199,12 +201,11 @@ def write_agent(
             w["nav"]["leg"][o] = 1
 
 
-def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int) -> None:
-    """Write ship ``name`` of a scenario into the empty vessel slot j of a record."""
+def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int, slots: Mapping[str, int]) -> None:
+    """Write ship ``name`` of a scenario into the empty vessel slot j of a record; ``slots`` are those of all names."""
     ship = scenario.ships[name]
     v = w["vessels"]
     v["kind"][j], v["model"][j], v["plant"][j] = _SHIP_KINDS[ship.class_], state.MODEL_KINEMATIC, -1
-    v["behaviour"][j] = state.BEHAVIOUR_WAYPOINTS
     v["length"][j], v["beam"][j] = ship.length, ship.beam
     v["turn_time"][j], v["turn_rate_max"][j] = ship.turn_time, ship.turn_rate(scenario.preset) * DEG
     frame = scenario.simulation.frame_ticks * scenario.simulation.dt
@@ -215,6 +216,7 @@ def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int) -> None
     _write_motion(v, j, start, heading, ship.set_speed)
     _write_station(v, j, mmsi, _AIS[ship.ais_class])
     _write_route(scenario, w["routes"], j, ship.waypoints, ship.acceptance_radius, _AFTER[ship.after_last])
+    write_behaviour(ship.behaviour, w, j, ship.class_, slots.__getitem__)
 
 
 def _write_motion(v: Any, j: int, start: tuple[float, float], heading: float, speed: float) -> None:

@@ -86,12 +86,12 @@ class Commands:
             raise ConfigError(f"spawn {id!r}: mmsi {thing.mmsi} is taken")
         self._forget(source)
         mmsi = thing.mmsi or next(n for n in range(257_000_001 if ship else 992_570_001, 1 << 30) if n not in taken)
-        for column in (self._w["routes"], self._w["vessels"]) if ship else (self._w["obstacles"],):
+        for column in (self._w["routes"], self._w["vessels"], self._w["pilots"]) if ship else (self._w["obstacles"],):
             for name in column.dtype.names or ():
                 column[name][slot] = 0
         scenario = self.scenario.model_copy(update={group: {id: thing}})
         if ship:
-            write_ship(scenario, self._w, slot, id, mmsi)
+            write_ship(scenario, self._w, slot, id, mmsi, {OWN_SHIP: 0, id: slot})
             self._w["vessels"]["frame_eta"][slot] = self._w["vessels"]["eta"][slot]
         else:
             write_obstacle(scenario, self._w, slot, id, mmsi)
@@ -121,6 +121,7 @@ class Commands:
             group["eta"][slot] = group["frame_eta"][slot] = north, east, psi
             speed = group["nu"][slot, 0]
             if group["plant"][slot] < 0:
+                group["heading_set"][slot] = psi
                 group["velocity"][slot] = speed * math.cos(psi), speed * math.sin(psi)
         else:
             group["position"][slot] = group["frame_position"][slot] = north, east

@@ -25,6 +25,7 @@ from pydantic import (
 from ..config import ConfigError, Model, locate, problem, suggestion
 from ..resources import shipped
 from ..units import KNOT, metres_per_degree
+from .behaviours import Behaviour, Hostile, Waypoints
 from .families import FAMILIES
 from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
 
@@ -226,6 +227,7 @@ class Ship(Model):
     speed_kn: NonNegative | None = Field(default=None, description="[kn]; neither: by class")
     waypoints: Annotated[tuple[Position, ...], Field(max_length=MAX_WAYPOINTS)]
     after_last: Literal["stop", "continue", "loop"] = "stop"
+    behaviour: Behaviour = Field(default=Waypoints(), description="what it does: a word, or a mapping with kind and options")
     acceptance_radius: Positive = Field(default=50.0, description="[m]")
     turn: Literal["lowpass", "constant"] | None = Field(
         default=None, description="low-pass filter, or constant rate; default: by preset (the original: constant)"
@@ -358,7 +360,15 @@ class Scenario(Model):
         for name, ship in self.ships.items():
             if self.local(ship.waypoints[0]) == self.local(ship.waypoints[1]):
                 raise problem("the first two are the same place: no direction to start in", "ships", name, "waypoints")
+            if isinstance(ship.behaviour, Hostile):
+                self._other_ship(ship.behaviour.target, name, "ships", name, "behaviour", "target")
         return self
+
+    def _other_ship(self, target: str, name: str, *key: str | int) -> None:
+        """Refuse a target that is no ship, or the ship itself."""
+        known = [OWN_SHIP, *(other for other in self.ships if other != name)]
+        if target not in known:
+            raise problem(f"unknown ship {target!r}{suggestion(target, known)}", *key)
 
     def _stations(self) -> list[tuple[tuple[str, ...], OwnShip | Ship | Obstacle]]:
         return [

@@ -15,9 +15,11 @@ from ..world.geometry import waypoint_reached
 from ..world.state import (
     AFTER_CONTINUE,
     AFTER_LOOP,
+    BEHAVIOUR_COLREGS,
     BEHAVIOUR_HOLD,
     MODEL_KINEMATIC,
 )
+from .pilots import pilot
 
 DEAD_BAND = 2.0 * math.pi / 180.0  #: [rad] of the original's constant-rate turn
 
@@ -51,15 +53,17 @@ def steer(w, seconds):
         psi = v.eta[j, 2]
         speed = v.speed[j]
         wanted = psi
-        if v.controlled[j]:
+        if v.controlled[j] or v.behaviour[j] == BEHAVIOUR_HOLD:
             wanted = v.heading_set[j]
-        elif v.behaviour[j] != BEHAVIOUR_HOLD:
+        else:
             follow_route(w, j)
             if r.done[j] == 0 and r.leg[j] < r.count[j]:
                 k = r.leg[j]
                 wanted = atan2(r.waypoint[j, k, 1] - v.eta[j, 1], r.waypoint[j, k, 0] - v.eta[j, 0])
             elif r.count[j] > 0 and r.after_last[j] != AFTER_CONTINUE:
                 speed = 0.0
+            if v.behaviour[j] >= BEHAVIOUR_COLREGS:
+                wanted, speed = pilot(w, j, wanted, speed, seconds)
         error = wrap(wanted - psi)
         limit = v.turn_rate_max[j] * seconds
         if v.turn_constant[j]:

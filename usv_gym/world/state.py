@@ -6,7 +6,8 @@ known at compile time.
 
 Sizes: B worlds, V vessel slots (slot 0 is the own ship by convention), M obstacle slots, S = V + M sources (a source is
 anything a sensor can see: vessel j is source j, obstacle m is source V + m), O observers, P plants (3-DOF vessels),
-A thrusters per plant, W waypoints per route, L bearing sectors of land, T stretches of coast.
+A thrusters per plant, W waypoints per route, L bearing sectors of land, T stretches of coast, E events,
+R encounters that a ship keeps in mind.
 
 Units and frames: SI and radians; {n} is the local tangent plane (north, east) at ``origin``; {b} is the body frame
 (forward, starboard).  Times are integers: ticks of ``dt_us``, or microseconds where the name ends in ``_us``.
@@ -25,12 +26,17 @@ A = 4  #: thrusters per plant
 W = 32  #: waypoints per route
 L = 72  #: bearing sectors of land in the picture, clockwise from north: sector i is [5 i, 5 i + 5) deg
 T = 8  #: stretches of coast among the detected targets, in the slots after those of the S sources
+E = 16  #: events of a scenario
+R = 4  #: vessels to which a COLREGs-obeying ship remembers what it is
+RADAR_PHANTOMS, LIDAR_PHANTOMS = 6, 4  #: false alarms that can be tracked at a time, see ``phantoms`` of the world
 
 # --- codes -----------------------------------------------------------------------------------------------------------
 KIND_SHIP, KIND_VESSEL, KIND_BOAT, KIND_USV = 0, 1, 2, 3
 KIND_ICEBERG, KIND_BUOY, KIND_ISLET, KIND_LIGHTHOUSE, KIND_PLATFORM = 10, 11, 12, 13, 14
 MODEL_KINEMATIC, MODEL_3DOF = 0, 1
-BEHAVIOUR_HOLD, BEHAVIOUR_WAYPOINTS = 0, 1
+#: what a ship that nobody controls does: keeps ``heading_set``; follows its route whatever comes; follows it and obeys the
+#: COLREGs; leaves it to pass ahead of another; wanders about it
+BEHAVIOUR_HOLD, BEHAVIOUR_WAYPOINTS, BEHAVIOUR_COLREGS, BEHAVIOUR_HOSTILE, BEHAVIOUR_ERRATIC = 0, 1, 2, 3, 4
 AFTER_STOP, AFTER_CONTINUE, AFTER_LOOP = 0, 1, 2
 AIS_NONE, AIS_CLASS_A, AIS_CLASS_B, AIS_ATON = 0, 1, 2, 3
 AIS, RADAR, LIDAR = 0, 1, 2  #: sensors of the TDM, in the order of every ``[.., 3]`` axis
@@ -65,6 +71,7 @@ def _weather() -> Dtype:
         ("wave_scale", f8),  # spread of the wave force per unit of gain [m]; in the preset `original` that of its noise
         # what weather does to sensors, as factors of range and of missed detections (1 = clear)
         ("radar_range_factor", f8), ("lidar_range_factor", f8), ("detection_factor", f8),
+        ("radar_clutter", f8), ("lidar_clutter", f8),  # false alarms per scan, on top of those of the sensor
     ], align=True)  # fmt: skip
 
 
@@ -110,8 +117,8 @@ def _plants(P: int) -> Dtype:
         # mixing of (surge, yaw) demands in [-1, 1] into commands, for autopilots and two-channel actions
         ("mix_surge", f8, (P, A)), ("mix_yaw", f8, (P, A)), ("mix_nozzle", f8, (P, A)),
         ("reverse_by_bucket", i1, (P,)),
-        # faults, written by scenario events: share of thrust that is left, nozzle held where it is
-        ("thrust_left", f8, (P, A)), ("nozzle_stuck", i1, (P, A)),
+        # faults, written by scenario events: share of thrust that is left, nozzle held where it is, shaft and bucket held
+        ("thrust_left", f8, (P, A)), ("nozzle_stuck", i1, (P, A)), ("jet_stuck", i1, (P, A)),
         # autopilot: heading error to yaw rate [1/s], rate error to demand [s/rad], its integral [1/rad];
         # speed error to demand [s/m], its integral [1/m], exponent of the steady speed curve; speed at full demand
         # [m/s], largest yaw rate asked for [rad/s]
@@ -137,7 +144,7 @@ def _vessels(V: int) -> Dtype:
         ("frame_eta", f8, (V, 3)),  # eta at the start of the traffic frame
         ("length", f8, (V,)), ("beam", f8, (V,)),  # [m]
         ("speed", f8, (V,)),  # set speed of kinematic ships [m/s]
-        ("heading_set", f8, (V,)),  # commanded heading of controlled kinematic ships [rad]
+        ("heading_set", f8, (V,)),  # heading that controlled kinematic ships and those on BEHAVIOUR_HOLD steer [rad]
         ("speed_hold", f8, (V,)),  # share of the speed error that is left after a frame, exp(-frame/T); 0: none
         ("turn_time", f8, (V,)), ("turn_rate_max", f8, (V,)), ("turn_decay", f8, (V,)),  # [s], [rad/s], 1 - exp(-frame/T)
         ("turn_constant", i1, (V,)),  # 1: turn at turn_rate_max with a dead band of 2 deg (the original)
@@ -153,6 +160,38 @@ def _routes(V: int) -> Dtype:
         ("radius", f8, (V,)),  # circle of acceptance [m]
         ("after_last", i1, (V,)), ("done", i1, (V,)),
         ("reached", i4, (V,)),  # how many waypoints were reached so far (a notice each)
+    ], align=True)  # fmt: skip
+
+
+def _pilots(V: int) -> Dtype:
+    """Who is on the bridge of a ship with a behaviour beyond its route (usv_gym/traffic)."""
+    return np.dtype([
+        ("range", f8, (V,)),  # [m] within which it heeds others (hostile: begins)
+        ("period_us", i8, (V,)), ("next_tick", i8, (V,)),  # between two looks (erratic: two whims); tick of the next
+        ("act_time", f8, (V,)), ("extremis_time", f8, (V,)),  # TCPA [s] at which it gives way; at which it acts as stand-on
+        ("clearance", f8, (V,)),  # [m] between hulls that it is content with
+        ("alteration", f8, (V,)),  # smallest alteration of course [rad]; erratic: largest off its route
+        ("acceleration", f8, (V,)),  # [m/s2] of changes of speed; 0: at once
+        ("ahead", f8, (V,)), ("target", i2, (V,)),  # hostile: how far ahead it passes [m], and of which vessel slot
+        ("wander", f8, (V,)),  # erratic: [m] from its route that it never exceeds
+        # state
+        ("phase", i1, (V,)),  # 0: on its route; COLREGs 1: evading; hostile 1: closing in, 2: has crossed, 3: done with it
+        # course [rad] that it steers off its route (erratic: off that of its route), share of its speed that it makes
+        ("course", f8, (V,)), ("factor", f8, (V,)),
+        ("met", i2, (V, R)), ("role", i1, (V, R)),  # vessel slot, and the locked Encounter towards it; role 0: free
+    ], align=True)  # fmt: skip
+
+
+def _events(E: int) -> Dtype:
+    """What happens in a scenario, and when (usv_gym/events.py)."""
+    return np.dtype([
+        ("trigger", i1, (E,)), ("threshold", f8, (E,)),  # TRIGGER_*; s, m or s
+        ("subject", i4, (E,)), ("point", f8, (E, 2)),  # source whose distance or TCPA counts; N, E [m] {n}, NaN: the own ship
+        ("duration", f8, (E,)),  # [s]; inf: for good
+        ("action", i1, (E,)), ("target", i4, (E,)),  # EVENT_*; source, or thruster (-1: all)
+        ("value", f8, (E, 6)), ("saved", f8, (E, 6)),  # how much; what was before
+        ("state", i1, (E,)),  # 0 to come, 1 under way, 2 over
+        ("began", i8, (E,)), ("ended", i8, (E,)),  # ticks
     ], align=True)  # fmt: skip
 
 
@@ -190,6 +229,7 @@ def _sensors() -> Dtype:
         ("bias", f8, (2,)), ("bias_time", f8, (2,)),  # stationary standard deviation [m], time constant [s]
         ("detection", f8), ("detection_radius", f8),  # P_d of a large object; apparent radius [m] at which P_d is halved
         ("timeout_us", i8),
+        ("false_alarms", f8),  # mean number per scan
         ("outage", i1),  # fault: gives nothing
     ], align=True)  # fmt: skip
     return np.dtype([
@@ -209,7 +249,8 @@ def _sensors() -> Dtype:
         ("inflation", f8),  # Carlson's federated inflation of Q and P0; 1 in the thesis
         # own navigation: period [us], white noise per field
         ("gnss_period_us", i8), ("gnss_noise", f8, (4,)),  # position [m], heading [rad], course [rad], speed [m/s]
-        ("gnss_frozen", i1), ("gnss_drift", f8, (2,)),  # faults: holds its last fix; offset [m] {n}
+        # faults: holds its last fix; offset [m] {n}, growing at a rate [m/s] since a tick
+        ("gnss_frozen", i1), ("gnss_drift", f8, (2,)), ("gnss_drift_rate", f8, (2,)), ("gnss_drift_tick", i8),
         ("mru_period_us", i8), ("mru_noise", f8, (2,)),  # heading [rad], yaw rate [rad/s]; roll, pitch, heave are 0 in 3 DOF
         ("imu_period_us", i8), ("imu_noise", f8, (2,)),  # specific force [m/s2], yaw rate [rad/s]
         ("log_period_us", i8), ("log_noise", f8),  # speed log: u, v [m/s]
@@ -228,6 +269,10 @@ def _ais(O: int, S: int) -> Dtype:
         ("position", f8, (S, 2)),  # reported N, E [m] {n}
         ("cog", f8, (S,)), ("heading", f8, (S,)),  # [rad]
         ("sog", f8, (S,)), ("rot", f8, (S,)),  # [m/s], [rad/s]; NaN where the message type has none
+        # fault: what a station says is off by an offset [m] {n} that grows at a rate [m/s] since a tick, under this MMSI
+        # (0: its own), and makes a target of its own in this slot (0: no fault)
+        ("spoof_offset", f8, (S, 2)), ("spoof_rate", f8, (S, 2)), ("spoof_tick", i8, (S,)), ("spoof_mmsi", i8, (S,)),
+        ("spoof_source", i4, (S,)),
         ("received", i4, (O, S)),  # sequence number of the last message that got through
         ("due_tick", i8, (O, S)),  # when that message arrives; -1: nothing on its way
         # the last message that arrived: N, E [m], COG, heading [rad], SOG [m/s], ROT [rad/s]; stamp -1: none yet
@@ -313,6 +358,10 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("area", f8, (2,)),  # centre-free bound: out of area when |N - N0| or |E - E0| exceeds it; [0] half size, 0: none
         ("weather", _weather()),
         ("vessels", _vessels(V)), ("plants", _plants(P)), ("routes", _routes(V)), ("obstacles", _obstacles(M)),
+        ("pilots", _pilots(V)), ("events", _events(E)), ("events_left", i4),  # how many may still begin or end
+        # the last so many obstacle slots stay inactive: targets that are not there; with clutter the last of these are those of
+        # the radar's and the LiDAR's false alarms, the others of spoofed AIS stations
+        ("phantoms", i4), ("clutter", i1),
         ("safety", _safety(O, S)),
         ("sensors", _sensors()), ("observer", i2, (O,)),  # vessel slot of each observer
         ("ais", _ais(O, S)), ("nav", _nav(O)), ("tracks", _tracks(O, S)), ("picture", _picture(O, S)),
