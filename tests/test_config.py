@@ -526,9 +526,9 @@ def test_a_row_is_written_completely_and_alone() -> None:
     first, second = load_scenario("busy_open_sea"), load_scenario("calm_crossing")
     worlds, _ = build_worlds(first, 3, capacity=(8, 16))
     fresh, _ = build_worlds(second, 1, capacity=(8, 16))
-    before = worlds.copy()
+    before = [worlds[b : b + 1].tobytes() for b in (0, 2)]  # a copy of a record does not keep its padding
     write_world(second, worlds, 1, 0)
-    assert worlds[[0, 2]].tobytes() == before[[0, 2]].tobytes()
+    assert [worlds[b : b + 1].tobytes() for b in (0, 2)] == before
     assert worlds[1:2].tobytes() == fresh.tobytes()
     write_world(second, worlds, 1, 2**64 - 1)
     assert worlds["seed"][1] == 2**64 - 1
