@@ -10,6 +10,7 @@ import numpy as np
 from usv_gym.engine import advance_worlds, reset_worlds
 from usv_gym.scenarios.build import build_worlds
 from usv_gym.scenarios.loader import load_scenario
+from usv_gym.traffic.replay import NO_TRACKS
 from usv_gym.world.land import NO_LAND
 from usv_gym.world.state import MODEL_KINEMATIC
 
@@ -32,7 +33,7 @@ def sea(B=1, *, first_seed=1, own_velocity=None, **keys: Any):
         v["model"][:, 0], v["plant"][:, 0] = MODEL_KINEMATIC, -1
         v["speed"][:, 0], v["heading_set"][:, 0] = own_velocity
         v["eta"][:, 0, 2] = v["frame_eta"][:, 0, 2] = own_velocity[1]
-    reset_worlds(worlds, NO_LAND, np.ones(B, bool))
+    reset_worlds(worlds, NO_LAND, NO_TRACKS, np.ones(B, bool))
     return worlds, names
 
 
@@ -40,7 +41,7 @@ def advance(worlds, seconds):
     """Sail on for a time that is a whole number of ticks."""
     ticks = round(seconds / worlds["dt"][0])
     assert abs(ticks * worlds["dt"][0] - seconds) < 1e-9
-    advance_worlds(worlds, NO_LAND, ticks, NO_ROWS)
+    advance_worlds(worlds, NO_LAND, NO_TRACKS, ticks, NO_ROWS)
 
 
 def watch(worlds, seconds, every, *paths):

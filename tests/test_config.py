@@ -369,7 +369,7 @@ def test_json_schema_describes_what_ships() -> None:
     assert schema["additionalProperties"] is False
     assert {"schema", "own_ship", "ships", "sensors"} <= set(schema["properties"])
     assert "base" in schema["$defs"]["SensorsInput"]["properties"]
-    assert "waypoints" in schema["$defs"]["Ship"]["required"]
+    assert {"waypoints", "track"} <= set(schema["$defs"]["Ship"]["properties"])
     jsonschema = pytest.importorskip("jsonschema")
     for path in shipped("scenarios").values():
         jsonschema.validate(read_yaml(path).data, schema)

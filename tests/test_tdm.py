@@ -11,6 +11,7 @@ from sensor_helpers import NO_NOISE, V, advance, rms, sea, watch, wrapped
 from usv_gym.engine import reset_worlds
 from usv_gym.scenarios.build import build_worlds
 from usv_gym.scenarios.loader import load_scenario
+from usv_gym.traffic.replay import NO_TRACKS
 from usv_gym.units import DEG, KNOT
 from usv_gym.world.land import NO_LAND
 from usv_gym.world.state import DESCRIPTOR_FIXED, DESCRIPTOR_VESSEL
@@ -276,7 +277,7 @@ def test_an_hour_of_the_busy_open_sea_stays_finite():
     B = 10
     worlds, names = build_worlds(load_scenario(keys), B, capacity=(V, 16))
     worlds["seed"] = np.arange(1, B + 1)
-    reset_worlds(worlds, NO_LAND, np.ones(B, bool))
+    reset_worlds(worlds, NO_LAND, NO_TRACKS, np.ones(B, bool))
     ships, bergs = [1, 2], [V + i for i, name in enumerate(names[V:]) if name]
     for _ in range(60):
         advance(worlds, 60.0)

@@ -11,6 +11,7 @@ import math
 from .jit import kernel, spliced
 from .sensors.nav import navigate
 from .sensors.schedule import first_events, sense
+from .traffic.replay import begin_replay, replay
 from .traffic.ships import follow_route, move_traffic, steer
 from .world.actuators import actuate
 from .world.disturbance import wave_step, weather_reset, weather_step
@@ -20,8 +21,8 @@ from .world.state import MODEL_3DOF
 
 
 @spliced
-def tick_world(w, land, rows, row):
-    """Advance one world by one tick; ``land`` is the pool of world/land.py.
+def tick_world(w, land, tracks, rows, row):
+    """Advance one world by one tick; ``land`` and ``tracks`` are the pools of world/land.py and traffic/replay.py.
 
     ``rows[row]`` [n, A, 3] are commands to plant 0 that arrive within the tick, in order (a thrust log faster than the
     tick); with n = 0 the command in the record holds.
@@ -47,7 +48,7 @@ def tick_world(w, land, rows, row):
                 wave_step(w, p, j, tick)
             plant_step(w, j, p, w.dt)
     if tick - w.frame_tick >= w.frame_ticks:
-        end_frame(w, land)
+        end_frame(w, land, tracks)
     if tick >= w.next_nav:
         if w.vessels.model[w.observer[0]] != MODEL_3DOF:
             move_traffic(w, tick)  # a kinematic observer is where the traffic is
@@ -58,7 +59,7 @@ def tick_world(w, land, rows, row):
 
 
 @spliced
-def end_frame(w, land):
+def end_frame(w, land, tracks):
     """Close the traffic frame that ends now and decide the next one."""
     move_traffic(w, w.tick)
     sweep(w, land)
@@ -67,16 +68,19 @@ def end_frame(w, land):
         if w.vessels.model[j] == MODEL_3DOF or w.vessels.controlled[j]:
             follow_route(w, j)
     begin_frame(w)
+    replay(w, tracks, w.frame_ticks * w.dt)
     steer(w, w.frame_ticks * w.dt)
 
 
 @spliced
-def reset_world(w, land):
+def reset_world(w, land, tracks):
     """Bring a freshly written world to tick 0: weather state, first decisions, first navigation, sensor schedule."""
     w.tick = 0
     w.traffic_tick = 0
     weather_reset(w)
+    begin_replay(w, tracks)
     begin_frame(w)
+    replay(w, tracks, w.frame_ticks * w.dt)
     steer(w, w.frame_ticks * w.dt)
     sweep(w, land)
     for o in range(w.observer.shape[0]):
@@ -86,26 +90,27 @@ def reset_world(w, land):
 
 
 @kernel
-def reset_worlds(worlds, land, mask):
+def reset_worlds(worlds, land, tracks, mask):
     """Reset the rows of ``worlds`` [B] where ``mask`` [B] is true; the others are not touched.
 
-    land: the pool that the worlds' ``land_id`` count in (world/land.py; ``NO_LAND`` for the open sea).
+    land: the pool that the worlds' ``land_id`` count in (world/land.py; ``NO_LAND`` for the open sea);
+    tracks: the pool of recorded tracks (traffic/replay.py; ``NO_TRACKS`` for none).
     """
     for b in range(worlds.shape[0]):
         if mask[b]:
-            reset_world(worlds[b], land)
+            reset_world(worlds[b], land, tracks)
 
 
 @kernel
-def advance_worlds(worlds, land, ticks, rows):
-    """Advance every world by ``ticks``; ``land`` is the pool of world/land.py.
+def advance_worlds(worlds, land, tracks, ticks, rows):
+    """Advance every world by ``ticks``; ``land`` and ``tracks`` are the pools of ``reset_worlds``.
 
     rows: float64 [ticks, n, A, 3], commands to plant 0 of every world, n of them within each tick; [0, 0, A, 3] to let the
     commands in the records hold.
     """
     for b in range(worlds.shape[0]):
         for k in range(ticks):
-            tick_world(worlds[b], land, rows, k)
+            tick_world(worlds[b], land, tracks, rows, k)
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import ConfigError, Document, validate
-from ..scenarios.build import build_worlds, write_weather
+from ..scenarios.build import build_worlds, track_pool, write_weather
 from ..scenarios.families import FAMILIES
 from ..scenarios.loader import Source, load_scenario
 from ..scenarios.schema import Scenario, Weather
@@ -83,6 +83,7 @@ class Core:
 
     worlds: NDArray[Any]
     land: NDArray[np.float64]  #: pool of the worlds' land (world/land.py)
+    tracks: NDArray[np.float64]  #: pool of the worlds' recorded tracks (traffic/replay.py)
     task: NDArray[Any]
     action_space: gym.Space[Any]
     names: list[str]
@@ -155,6 +156,7 @@ class Core:
         self.source, self.vessel, self.scenario, self.model, self._family = source, vessel, scenario, model, family
         self.worlds, self.names, self.action_space = worlds, names, space
         self.land = NO_LAND
+        self.tracks = track_pool(scenario)
         self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation
         self.control_interval = simulation.control_ticks * simulation.dt
@@ -262,9 +264,9 @@ class Core:
 
     def _run(self, rows: NDArray[np.float64]) -> int:
         if self.crew.size == 1 or np.count_nonzero(self._what) < _WORTH_SHARING or not self._plausible():
-            return int(run_batch(self.worlds, self.land, self.task, self._episodes, self._obs, rows))
-        self.crew.share(self.num, lambda part: run_batch(self.worlds[part], self.land, self.task, self._episodes[part],
-                                                         self._obs[part], rows))  # fmt: skip
+            return int(run_batch(self.worlds, self.land, self.tracks, self.task, self._episodes, self._obs, rows))
+        self.crew.share(self.num, lambda part: run_batch(self.worlds[part], self.land, self.tracks, self.task,
+                                                         self._episodes[part], self._obs[part], rows))  # fmt: skip
         return -1
 
     def _plausible(self) -> bool:

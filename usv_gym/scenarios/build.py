@@ -7,14 +7,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..config import ConfigError
 from ..units import DEG, DEG_PER_MIN, KNOT, metres_per_degree
 from ..world import state
 from ..world.disturbance import set_weather
 from ..world.vessel import KinematicModel, VesselModel, load_vessel, write_kinematic, write_plant
+from . import tracks
 from .behaviours import write_behaviour
-from .schema import OWN_SHIP, GeoPoint, Preset, Scenario, Weather
+from .schema import OWN_SHIP, GeoPoint, Preset, Scenario, Ship, Weather
 from .sensor_schema import Error, Lidar, Radar, Sensors
 
 Worlds: TypeAlias = np.ndarray[Any, np.dtype[Any]]
@@ -116,14 +118,23 @@ def write_world(
     if not agents:
         _write_own_ship(scenario, worlds, b, mmsis[OWN_SHIP])
     slots = {OWN_SHIP: 0} | {name: j for j, name in enumerate(scenario.ships, start=first)}
-    for name in scenario.ships:
+    knot = 0
+    for name, ship in scenario.ships.items():
         write_ship(scenario, w, slots[name], name, mmsis[name], slots)
+        if ship.track is not None:  # as in track_pool
+            w["replays"]["first"][slots[name]], w["replays"]["count"][slots[name]] = knot, tracks.knots(ship.track)
+            knot += tracks.knots(ship.track)
     for i, name in enumerate(scenario.obstacles):
         write_obstacle(scenario, w, i, name, mmsis[name])
     for group, frame, now in (("vessels", "frame_eta", "eta"), ("obstacles", "frame_position", "position")):
         w[group][frame] = w[group][now]
     _write_sensors(scenario.sensors, w["sensors"])
     _write_nothing_yet(w)
+
+
+def track_pool(scenario: Scenario) -> NDArray[np.float64]:
+    """The tracks of a scenario's replayed ships, in file order, as the pool [n, 7] of the kernels (traffic/replay.py)."""
+    return tracks.pool(ship.track for ship in scenario.ships.values() if ship.track is not None)
 
 
 def write_weather(weather: Weather, w: Any, preset: Preset) -> None:
@@ -211,12 +222,27 @@ def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int, slots: 
     frame = scenario.simulation.frame_ticks * scenario.simulation.dt
     v["turn_decay"][j] = -math.expm1(-frame / ship.turn_time)
     v["turn_constant"][j] = ship.turns_constantly(scenario.preset)
-    start, following = (scenario.local(place) for place in ship.waypoints[:2])
-    heading = math.atan2(following[1] - start[1], following[0] - start[0])
-    _write_motion(v, j, start, heading, ship.set_speed)
     _write_station(v, j, mmsi, _AIS[ship.ais_class])
-    _write_route(scenario, w["routes"], j, ship.waypoints, ship.acceptance_radius, _AFTER[ship.after_last])
+    if ship.track is not None:
+        _, north, east, course, speed, *told = ship.track[0][0]
+        _write_motion(v, j, (north, east), (told[0] if told else course) * DEG, speed)
+    else:
+        start, following = (scenario.local(place) for place in ship.waypoints[:2])
+        heading = math.atan2(following[1] - start[1], following[0] - start[0])
+        _write_motion(v, j, start, heading, ship.set_speed)
+        _write_route(scenario, w["routes"], j, ship.waypoints, ship.acceptance_radius, _AFTER[ship.after_last])
     write_behaviour(ship.behaviour, w, j, ship.class_, slots.__getitem__)
+    if ship.track is not None:
+        _write_replay(ship, w, j)
+
+
+def _write_replay(ship: Ship, w: Any, j: int) -> None:
+    """Let vessel j sail its track before it behaves; whether it is there at tick 0 is for the kernel to say."""
+    v, r = w["vessels"], w["replays"]
+    r["then"][j], v["behaviour"][j] = v["behaviour"][j], state.BEHAVIOUR_REPLAY
+    if ship.handover is not None:
+        r["hands_over"][j] = 1
+        r["range"][j], r["dcpa"][j], r["tcpa"][j] = ship.handover.distance, ship.handover.dcpa, ship.handover.tcpa
 
 
 def _write_motion(v: Any, j: int, start: tuple[float, float], heading: float, speed: float) -> None:

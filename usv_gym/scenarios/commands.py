@@ -16,7 +16,7 @@ import numpy as np
 
 from ..config import ConfigError, Document, suggestion, validate
 from ..units import DEG
-from ..world.state import T, W
+from ..world.state import BEHAVIOUR_HOLD, BEHAVIOUR_REPLAY, BEHAVIOUR_WAYPOINTS, T, W
 from .build import Names, Worlds, write_obstacle, write_ship
 from .schema import OWN_SHIP, Obstacle, Scenario, Ship
 
@@ -28,7 +28,9 @@ class Notice:
     """Something that happened to an object."""
 
     t: float  #: [s]
-    kind: str  #: spawned, removed, moved, waypoints_set, ais_on, ais_off, waypoint_reached, route_done
+    #: spawned, removed, moved, waypoints_set, ais_on, ais_off, waypoint_reached, route_done; of replayed ships: appeared,
+    #: vanished, handed_over
+    kind: str
     id: str  #: of the object
     text: str = ""
     source: int = -1  #: number of the object among the sources
@@ -54,6 +56,7 @@ class Commands:
         self.called = list(self.names)
         self._reached = self._w["routes"]["reached"].copy()
         self._done = self._w["routes"]["done"].copy()
+        self._changes = self._w["replays"]["changes"].copy()
 
     # --- commands ----------------------------------------------------------------------------------------------------
     def spawn(self, id: str, spec: Mapping[str, Any]) -> int:
@@ -75,13 +78,16 @@ class Commands:
         one = validate(Scenario, document)
         V = self._w["vessels"]["active"].shape[0]
         active = self._w["vessels"]["active"] if ship else self._w["obstacles"]["active"]
-        free = np.flatnonzero(active == 0)
+        expected = (self._w["replays"]["count"] > 0) if ship else np.zeros(len(active), bool)  # replayed ships come back
+        free = np.flatnonzero((active == 0) & ~expected)
         if not len(free):
             raise ConfigError(f"spawn {id!r}: no free slot among {len(active)} {'vessels' if ship else 'obstacles'}")
         slot = int(free[0])
         source = slot if ship else V + slot
         thing: Ship | Obstacle = one.ships[id] if ship else one.obstacles[id]
-        taken = {int(n) for g in ("vessels", "obstacles") for n in self._w[g]["mmsi"][self._w[g]["active"] != 0]}
+        there = (self._w["vessels"]["active"] != 0) | (self._w["replays"]["count"] > 0)
+        taken = {*self._w["vessels"]["mmsi"][there].tolist(),
+                 *self._w["obstacles"]["mmsi"][self._w["obstacles"]["active"] != 0].tolist()}  # fmt: skip
         if thing.mmsi in taken:
             raise ConfigError(f"spawn {id!r}: mmsi {thing.mmsi} is taken")
         self._forget(source)
@@ -106,6 +112,8 @@ class Commands:
         source = self._find(id, "delete")
         group, slot = self._slot(source)
         group["active"][slot] = 0
+        if source < len(self._changes):
+            self._w["replays"]["count"][slot] = 0  # and it does not come back
         self._w["ais"]["next_tick"][source] = _FAR
         self._note("removed", source, "delete", {"id": id})
         self.names[source] = ""
@@ -118,6 +126,7 @@ class Commands:
         self._settle()
         if "eta" in (group.dtype.names or ()):
             psi = group["eta"][slot, 2] if heading_deg is None else heading_deg * DEG
+            self._end_replay(slot, BEHAVIOUR_HOLD, psi)
             group["eta"][slot] = group["frame_eta"][slot] = north, east, psi
             speed = group["nu"][slot, 0]
             if group["plant"][slot] < 0:
@@ -138,6 +147,7 @@ class Commands:
             if len(place) != 2:
                 raise ConfigError(f"set_waypoints {id!r}: expected [north, east] pairs, got {list(place)!r}")
             _finite("set_waypoints", id, *place)
+        self._end_replay(source, BEHAVIOUR_WAYPOINTS, float(self._w["vessels"]["eta"][source, 2]))
         route, here = self._w["routes"], self._w["vessels"]["eta"][source, :2]
         route["waypoint"][source, 0] = here
         route["waypoint"][source, 1 : 1 + len(waypoints)] = waypoints
@@ -170,7 +180,7 @@ class Commands:
 
     # --- notices -----------------------------------------------------------------------------------------------------
     def notices(self) -> list[Notice]:
-        """What happened since the last call, in order: commands that took effect, waypoints reached, routes done."""
+        """What happened since the last call, in order: commands, waypoints reached, routes done, replayed ships."""
         route = self._w["routes"]
         for j in np.flatnonzero((route["reached"] != self._reached) | (route["done"] != self._done)).tolist():
             for k in range(int(self._reached[j]), int(route["reached"][j])):
@@ -178,6 +188,11 @@ class Commands:
             if route["done"][j] and not self._done[j]:
                 self._pending.append(self._notice("route_done", j))
         self._reached[:], self._done[:] = route["reached"], route["done"]
+        v, changes = self._w["vessels"], self._w["replays"]["changes"]
+        for j in np.flatnonzero(changes != self._changes).tolist():
+            left = v["behaviour"][j] != BEHAVIOUR_REPLAY
+            self._pending.append(self._notice("handed_over" if left else "appeared" if v["active"][j] else "vanished", j))
+        self._changes[:] = changes
         happened, self._pending = self._pending, []
         return happened
 
@@ -203,6 +218,14 @@ class Commands:
     def _slot(self, source: int) -> tuple[Any, int]:
         V = self._w["vessels"]["active"].shape[0]
         return (self._w["vessels"], source) if source < V else (self._w["obstacles"], source - V)
+
+    def _end_replay(self, slot: int, behaviour: int, psi: float) -> None:
+        """A replayed ship that is given an order leaves its track for good, at its present speed."""
+        v = self._w["vessels"]
+        if v["behaviour"][slot] == BEHAVIOUR_REPLAY:
+            v["behaviour"][slot], v["heading_set"][slot] = behaviour, psi
+            v["speed"][slot] = math.hypot(*v["velocity"][slot])
+            self._w["replays"]["count"][slot] = 0
 
     def _settle(self) -> None:
         """Bring traffic to the present tick before one of it is put elsewhere."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import (
@@ -28,6 +29,7 @@ from ..units import KNOT, metres_per_degree
 from .behaviours import Behaviour, Hostile, Waypoints
 from .families import FAMILIES
 from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
+from .tracks import TrackError, check, nested, read_tracks
 
 Latitude = Annotated[float, Field(strict=True, ge=-90, le=90)]
 Longitude = Annotated[float, Field(strict=True, ge=-180, le=180)]
@@ -215,8 +217,20 @@ def _by_class(what: str) -> Callable[[dict[str, Any]], Any]:
     return lambda fields: getattr(SHIP_CLASSES[fields.get("class_", "vessel")], what)
 
 
+class Handover(Model):
+    """When a replayed ship leaves its track, for good, to its `behaviour`."""
+
+    distance: NonNegative = Field(default=0.0, description="[m] to the own ship")
+    dcpa: NonNegative = Field(default=0.0, description="[m] from the own ship that it will pass at, ...")
+    tcpa: Positive = Field(default=600.0, description="... within this time [s]")
+
+
+Knot = Annotated[tuple[Number, ...], Field(min_length=5, max_length=6)]
+Track = tuple[tuple[Knot, ...], ...]
+
+
 class Ship(Model):
-    """A ship that follows waypoints; the first one is where it starts, heading for the second."""
+    """A ship that follows waypoints, the first one is where it starts, heading for the second; or that replays a track."""
 
     class_: Literal["ship", "vessel", "boat"] = Field(
         default="vessel", alias="class", description="default: by length, ship above 50 m, vessel above 15 m, else boat"
@@ -225,7 +239,13 @@ class Ship(Model):
     beam: Positive = Field(default_factory=lambda fields: fields.get("length", 6.0) / 6.0, description="[m]; L / 6")
     speed: NonNegative | None = Field(default=None, description="[m/s]")
     speed_kn: NonNegative | None = Field(default=None, description="[kn]; neither: by class")
-    waypoints: Annotated[tuple[Position, ...], Field(max_length=MAX_WAYPOINTS)]
+    waypoints: Annotated[tuple[Position, ...], Field(max_length=MAX_WAYPOINTS)] = ()
+    track: Annotated[Track, BeforeValidator(nested, json_schema_input_type=str | tuple[Knot, ...] | Track)] | None = Field(
+        default=None,
+        description="recorded, instead of waypoints: a CSV file beside this one, or knots [t, north, east, course_deg, "
+        "speed, heading_deg], or a list of parts of knots between which the ship is not seen",
+    )
+    handover: Handover | None = Field(default=None, description="when a replayed ship is left to itself; none: never")
     after_last: Literal["stop", "continue", "loop"] = "stop"
     behaviour: Behaviour = Field(default=Waypoints(), description="what it does: a word, or a mapping with kind and options")
     acceptance_radius: Positive = Field(default=50.0, description="[m]")
@@ -248,11 +268,26 @@ class Ship(Model):
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
-        if len(self.waypoints) < 2:
+        if self.track is not None:
+            self._replays()
+        elif self.handover is not None:
+            raise problem("only a ship with a track is handed over", "handover")
+        elif not self.waypoints:
+            raise problem("required key is missing (or track)", "waypoints")
+        elif len(self.waypoints) < 2:
             raise problem(f"needs at least two waypoints, got {len(self.waypoints)}", "waypoints")
         if self.speed is not None and self.speed_kn is not None:
             raise problem("give speed or speed_kn, not both", "speed_kn")
         return self
+
+    def _replays(self) -> None:
+        for key in ("waypoints", "speed", "speed_kn"):
+            if getattr(self, key):
+                raise problem("a ship with a track has none of its own", key)
+        try:
+            check(self.track or ())
+        except TrackError as error:
+            raise problem(str(error), "track") from None
 
     @property
     def set_speed(self) -> float:
@@ -322,6 +357,24 @@ class Family(Model):
         return value
 
 
+def _read_tracks(ships: Any, info: ValidationInfo) -> Any:
+    """Put the knots of CSV files in the place of their names, so that a scenario holds all that it needs."""
+    if not isinstance(ships, Mapping):
+        return ships
+    directory = (info.context or {}).get("directory") or Path()
+    read = {}
+    for name, ship in ships.items():
+        if isinstance(ship, Mapping) and isinstance(ship.get("track"), str):
+            try:
+                tracks = read_tracks(directory / ship["track"])
+            except TrackError as error:
+                raise problem(str(error), name, "track") from None
+            if name not in tracks:
+                raise problem(f"no rows of ship {name!r} in {ship['track']}{suggestion(name, tracks)}", name, "track")
+            read[name] = {**ship, "track": tracks[name]}
+    return {**ships, **read}
+
+
 # --- scenario --------------------------------------------------------------------------------------------------------
 class Scenario(Model):
     """Everything a world is made of."""
@@ -337,7 +390,7 @@ class Scenario(Model):
     simulation: Simulation = Simulation()
     weather: Weather = Weather()
     own_ship: OwnShip = Field(default_factory=OwnShip)
-    ships: dict[Name, Ship] = Field(default_factory=dict)
+    ships: Annotated[dict[Name, Ship], BeforeValidator(_read_tracks)] = Field(default_factory=dict)
     obstacles: dict[Name, Obstacle] = Field(default_factory=dict)
     sensors: Annotated[Sensors, BeforeValidator(expand_sensors, json_schema_input_type=str | SensorsInput)] = Field(
         default="thesis", validate_default=True, description="name in configs/sensors, path, or mapping with `base`"
@@ -358,7 +411,7 @@ class Scenario(Model):
                     raise problem(f"{thing.mmsi} is that of {'.'.join(given[thing.mmsi])} already", *path, "mmsi")
                 given[thing.mmsi] = path
         for name, ship in self.ships.items():
-            if self.local(ship.waypoints[0]) == self.local(ship.waypoints[1]):
+            if ship.waypoints and self.local(ship.waypoints[0]) == self.local(ship.waypoints[1]):
                 raise problem("the first two are the same place: no direction to start in", "ships", name, "waypoints")
             if isinstance(ship.behaviour, Hostile):
                 self._other_ship(ship.behaviour.target, name, "ships", name, "behaviour", "target")

@@ -31,9 +31,9 @@ def distance_to_go(w, j):
 
 
 @spliced
-def begin_episodes(w, land, tasks, episodes):
+def begin_episodes(w, land, tracks, tasks, episodes):
     """Reset a world and what its observers remember of their episodes."""
-    reset_world(w, land)
+    reset_world(w, land, tracks)
     for o in range(w.observer.shape[0]):
         episode = episodes[o]
         own = w.observer[o]
@@ -142,7 +142,7 @@ def _judge(w, o, task, episode):
 
 
 @spliced
-def step_task(w, land, tasks, episodes, rows):
+def step_task(w, land, tracks, tasks, episodes, rows):
     """One control step of a world: every observer's action, the ticks, every observer's judgement.
 
     Observers whose vessel has left the sea do nothing.  A lone observer's step ends where its vessel collides or runs aground.
@@ -162,7 +162,7 @@ def step_task(w, land, tasks, episodes, rows):
             for o in range(O):
                 if w.vessels.active[w.observer[o]]:
                     _pilot(w, o, tasks[o], episodes[o])
-        tick_world(w, land, rows, k)
+        tick_world(w, land, tracks, rows, k)
         if O == 1 and tasks[0].end_on_collision and (w.safety.collided_with[0] >= 0 or w.safety.grounded[0]):
             break
     move_traffic(w, w.tick)
@@ -186,7 +186,7 @@ def _possible(task, action):
 
 
 @kernel
-def run_batch(worlds, land, tasks, episodes, obs, rows):
+def run_batch(worlds, land, tracks, tasks, episodes, obs, rows):
     """Begin an episode in the rows that ask for BEGIN, make a control step in those that ask for STEP, leave the others.
 
     worlds [B]; land, the pool that their ``land_id`` count in (world/land.py); tasks [O], one per observer; episodes [B, O]
@@ -204,9 +204,9 @@ def run_batch(worlds, land, tasks, episodes, obs, rows):
     for b in range(worlds.shape[0]):
         what = episodes[b, 0].what
         if what == BEGIN:
-            begin_episodes(worlds[b], land, tasks, episodes[b])
+            begin_episodes(worlds[b], land, tracks, tasks, episodes[b])
         elif what == STEP:
-            step_task(worlds[b], land, tasks, episodes[b], rows)
+            step_task(worlds[b], land, tracks, tasks, episodes[b], rows)
         if what != 0:
             for o in range(O):
                 observe(worlds[b], land, o, tasks[o], obs[b, o])

@@ -17,6 +17,7 @@ from ..world.state import (
     AFTER_LOOP,
     BEHAVIOUR_COLREGS,
     BEHAVIOUR_HOLD,
+    BEHAVIOUR_REPLAY,
     MODEL_KINEMATIC,
 )
 from .pilots import pilot
@@ -48,7 +49,7 @@ def steer(w, seconds):
     """Decide turn and speed of every kinematic ship for a frame of this many seconds."""
     v, r = w.vessels, w.routes
     for j in range(v.active.shape[0]):
-        if v.active[j] == 0 or v.model[j] != MODEL_KINEMATIC:
+        if v.active[j] == 0 or v.model[j] != MODEL_KINEMATIC or v.behaviour[j] == BEHAVIOUR_REPLAY:
             continue
         psi = v.eta[j, 2]
         speed = v.speed[j]

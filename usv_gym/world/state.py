@@ -24,6 +24,7 @@ Dtype = np.dtype[Any]
 
 A = 4  #: thrusters per plant
 W = 32  #: waypoints per route
+KNOT_FIELDS = 7  #: numbers per knot in the pool of recorded tracks (traffic/replay.py)
 L = 72  #: bearing sectors of land in the picture, clockwise from north: sector i is [5 i, 5 i + 5) deg
 T = 8  #: stretches of coast among the detected targets, in the slots after those of the S sources
 E = 16  #: events of a scenario
@@ -35,8 +36,10 @@ KIND_SHIP, KIND_VESSEL, KIND_BOAT, KIND_USV = 0, 1, 2, 3
 KIND_ICEBERG, KIND_BUOY, KIND_ISLET, KIND_LIGHTHOUSE, KIND_PLATFORM = 10, 11, 12, 13, 14
 MODEL_KINEMATIC, MODEL_3DOF = 0, 1
 #: what a ship that nobody controls does: keeps ``heading_set``; follows its route whatever comes; follows it and obeys the
-#: COLREGs; leaves it to pass ahead of another; wanders about it
+#: COLREGs; leaves it to pass ahead of another; wanders about it;
+#: sails a recorded track
 BEHAVIOUR_HOLD, BEHAVIOUR_WAYPOINTS, BEHAVIOUR_COLREGS, BEHAVIOUR_HOSTILE, BEHAVIOUR_ERRATIC = 0, 1, 2, 3, 4
+BEHAVIOUR_REPLAY = 5
 AFTER_STOP, AFTER_CONTINUE, AFTER_LOOP = 0, 1, 2
 AIS_NONE, AIS_CLASS_A, AIS_CLASS_B, AIS_ATON = 0, 1, 2, 3
 AIS, RADAR, LIDAR = 0, 1, 2  #: sensors of the TDM, in the order of every ``[.., 3]`` axis
@@ -192,6 +195,17 @@ def _events(E: int) -> Dtype:
         ("value", f8, (E, 6)), ("saved", f8, (E, 6)),  # how much; what was before
         ("state", i1, (E,)),  # 0 to come, 1 under way, 2 over
         ("began", i8, (E,)), ("ended", i8, (E,)),  # ticks
+    ], align=True)  # fmt: skip
+
+
+def _replays(V: int) -> Dtype:
+    """Recorded tracks of ships on BEHAVIOUR_REPLAY: where in the pool they are, and when they are left (traffic/replay.py)."""
+    return np.dtype([
+        ("first", i8, (V,)), ("count", i4, (V,)), ("knot", i8, (V,)),  # first knot, how many; the one last passed (state)
+        # handover to the behaviour `then`: within a range [m] of an observer's vessel, or when it will pass closer than dcpa
+        # [m] within tcpa [s]
+        ("hands_over", i1, (V,)), ("then", i1, (V,)), ("range", f8, (V,)), ("dcpa", f8, (V,)), ("tcpa", f8, (V,)),
+        ("changes", i4, (V,)),  # how often it appeared, vanished or was handed over (a notice each)
     ], align=True)  # fmt: skip
 
 
@@ -358,7 +372,8 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("area", f8, (2,)),  # centre-free bound: out of area when |N - N0| or |E - E0| exceeds it; [0] half size, 0: none
         ("weather", _weather()),
         ("vessels", _vessels(V)), ("plants", _plants(P)), ("routes", _routes(V)), ("obstacles", _obstacles(M)),
-        ("pilots", _pilots(V)), ("events", _events(E)), ("events_left", i4),  # how many may still begin or end
+        ("pilots", _pilots(V)), ("replays", _replays(V)),
+        ("events", _events(E)), ("events_left", i4),  # how many may still begin or end
         # the last so many obstacle slots stay inactive: targets that are not there; with clutter the last of these are those of
         # the radar's and the LiDAR's false alarms, the others of spoofed AIS stations
         ("phantoms", i4), ("clutter", i1),
