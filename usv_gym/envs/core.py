@@ -293,6 +293,7 @@ class Core:
             "beam": self.model.beam,
             "control_interval": self.control_interval,
             "channels": self.actions.shape[1],
+            "targets": config.targets,
             **{name: getattr(config, name) for name in (
                 "range_scale", "distance_scale", "cross_track_scale", "target_speed_scale", "radius_scale", "rate_scale")},
         }  # fmt: skip

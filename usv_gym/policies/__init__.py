@@ -1,40 +1,58 @@
-"""Controllers that ship with the package, by name."""
+"""Controllers that ship with the package, by name, and those of others, by file."""
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 from ..config import ConfigError, suggestion
 from .base import Controller
-from .baselines import Avoid, Idle, Waypoints
 
-POLICIES: dict[str, tuple[type, str]] = {
-    "waypoints": (Waypoints, "line-of-sight guidance along the route; sees no traffic"),
-    "avoid": (Avoid, "the same, going around what the TDM reports; an honest reactive baseline"),
-    "idle": (Idle, "no thrust"),
+#: name: (module:class, what it does); imported when it is asked for, because it compiles
+POLICIES: dict[str, tuple[str, str]] = {
+    "waypoints": ("waypoints:Waypoints", "line-of-sight guidance along the route; sees no traffic"),
+    "avoid": ("avoid:Avoid", "the same, going around what the TDM reports; an honest reactive baseline"),
+    "vo": ("vo:VelocityObstacles", "velocity obstacles with COLREGs (Kuwata et al. 2014)"),
+    "sbmpc": ("sbmpc:SimulationBasedMPC", "simulation-based model predictive control (Johansen et al. 2016)"),
+    "apf": ("apf:PotentialField", "artificial potential field that turns with the rules (Ge and Cui 2002, Lyu and Yin 2019)"),
+    "idle": ("idle:Idle", "no thrust"),
 }
 #: drives the actuators from a recorded mission; needs no observation, so it is no controller
 THRUST_LOG = "thrust-log"
 
 
 def make_policy(name: str, *, trust: bool = False) -> Controller:
-    """A built-in controller by name, or a learned one from its file.
+    """A controller: built in, learned (a file), or of one's own (``module:Class`` or ``path.py:Class``).
 
-    ``trust`` also takes files that execute code when they are read; see :func:`~usv_gym.policies.learned.load_policy`.
+    ``trust`` also takes files of stable-baselines3 that execute code when they are read; see
+    :func:`~usv_gym.policies.learned.load_policy`.
 
     Raises
     ------
     ConfigError
-        if there is none of that name, or the file is no policy.
+        if there is none of that name, the file is no policy, or the class no controller.
     """
-    if name not in POLICIES and (Path(name).suffix == ".zip" or Path(name).is_file()):
+    if name in POLICIES:
+        module, _, cls = POLICIES[name][0].partition(":")
+        controller: Controller = getattr(importlib.import_module(f"{__name__}.{module}"), cls)()
+        return controller
+    if is_custom(name):
+        from .custom import load_custom
+
+        return load_custom(name)
+    if Path(name).suffix == ".zip" or Path(name).is_file():
         from .learned import load_policy
 
         return load_policy(name, trust=trust)
-    if name not in POLICIES:
-        raise ConfigError(f"unknown policy {name!r}{suggestion(name, [*POLICIES, THRUST_LOG])}")
-    controller: Controller = POLICIES[name][0]()
-    return controller
+    raise ConfigError(
+        f"unknown policy {name!r}{suggestion(name, [*POLICIES, THRUST_LOG])} "
+        "(a controller of your own: my.py:Class or module:Class; a learned one: policy.zip)"
+    )
 
 
-__all__ = ["POLICIES", "THRUST_LOG", "Controller", "make_policy"]
+def is_custom(name: str) -> bool:
+    """Whether a policy is code of the user's: ``module:Class``, ``path.py:Class`` or ``path.py``."""
+    return ":" in name or name.endswith(".py")
+
+
+__all__ = ["POLICIES", "THRUST_LOG", "Controller", "is_custom", "make_policy"]

@@ -1,0 +1,180 @@
+"""What the built-in controllers share: a kernel that decides for a batch of observations, and its eyes and rudder.
+
+They look at the flat observation ``tracks``, that is, at the sensor picture and never at truth, and steer by
+``heading_speed``, so that they drive every vessel.  One controller alone is a batch of one, bit for bit.
+
+Inside the kernels everything is in SI units and in {b} as it is now: x ahead, y to starboard, angles off the bow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..jit  import inner
+from ..tasks.task import N_OWN, N_TARGET, TaskConfig
+from ..trig import PI, atan2, clip, sincos, wrap
+
+#: what a lookout asks for: the 16 nearest targets within 2 NM, up to 50 kn and 500 m in radius
+LOOKOUT = TaskConfig(
+    action="heading_speed", targets=16, range_scale=3704.0, distance_scale=10_000.0, target_speed_scale=25.0,
+    radius_scale=500.0,
+)  # fmt: skip
+
+#: facts of the vessel and of the observation
+SHIP = np.dtype([
+    ("targets", "i8"), ("max_speed", "f8"), ("cruise", "f8"), ("length", "f8"), ("dt", "f8"),
+    ("range_scale", "f8"), ("distance_scale", "f8"), ("target_speed_scale", "f8"), ("radius_scale", "f8"),
+    ("rate_scale", "f8"),
+    ("lookahead", "f8"), ("sigma", "f8"),  # of the line of sight: [m], integral's weight [m/s]
+    ("turn_rate", "f8"), ("speed_time", "f8"),  # assumed of its own turns [rad/s] and of its own speed [s]
+], align=True)  # fmt: skip
+#: the own ship as it is seen
+OWN = np.dtype([
+    ("u", "f8"), ("v", "f8"), ("r", "f8"),  # over ground [m/s]; [rad/s]
+    ("leg", "f8"), ("cross_track", "f8"),  # course of the active leg [rad]; [m], + to starboard of it
+    ("distance", "f8"), ("next_turn", "f8"), ("last", "i8"),  # to the active waypoint [m]; at it [rad]; is the last
+    ("wanted", "f8"),  # line-of-sight course [rad]
+], align=True)  # fmt: skip
+#: a target as it is seen: a disc that moves
+TARGET = np.dtype([
+    ("x", "f8"), ("y", "f8"), ("vx", "f8"), ("vy", "f8"),  # [m], over ground [m/s]
+    ("speed", "f8"), ("distance", "f8"),  # [m/s], [m] from here to its centre
+    ("radius", "f8"),  # [m], with one standard deviation of its position
+    ("moves", "i8"), ("code", "i8"),  # 1: under way; encounter with the own ship on its route
+    ("dcpa", "f8"), ("tcpa", "f8"),  # with the own ship on its route [m], [s]
+], align=True)  # fmt: skip
+
+MOVING = 0.7  #: [m/s] what makes a target one that the steering rules are about
+SIGMA = 0.2  # weight of the integral, as a share of the cruising speed; 0.25 is critically damped
+
+
+@inner
+def look(obs, ship, own, targets):
+    """Read an observation [n] into ``own`` and ``targets`` [>= K]; returns how many targets there are.
+
+    Everything that has to be kept clear of becomes a disc in ``targets``, ships, icebergs and shores alike.
+    """
+    own.u, own.v = obs[0] * ship.max_speed, obs[1] * ship.max_speed
+    own.r = obs[2] * ship.rate_scale
+    own.leg = atan2(np.float64(obs[3]), np.float64(obs[4]))
+    own.distance = obs[6] * ship.distance_scale
+    # not obs[5], which is clipped: the waypoint is on the leg, so its bearing tells the same
+    own.cross_track = own.distance * math.sin(own.leg - atan2(np.float64(obs[7]), np.float64(obs[8])))
+    own.next_turn = atan2(np.float64(obs[9]), np.float64(obs[10]))
+    own.last = 1 if obs[11] > 0.5 else 0
+    found = 0
+    for i in range(ship.targets):
+        at = N_OWN + i * N_TARGET
+        if obs[at] < 0.5:
+            break
+        if abs(obs[at + 1]) >= 1.0 or abs(obs[at + 2]) >= 1.0:
+            continue  # farther away than the observation can say
+        t = targets[found]
+        t.x, t.y = obs[at + 1] * ship.range_scale, obs[at + 2] * ship.range_scale
+        t.vx, t.vy = obs[at + 3] * ship.target_speed_scale, obs[at + 4] * ship.target_speed_scale
+        t.speed = math.hypot(t.vx, t.vy)
+        t.distance = math.hypot(t.x, t.y)
+        t.radius = (obs[at + 6] + obs[at + 7]) * ship.radius_scale
+        t.moves = 1 if t.speed > MOVING else 0
+        found += 1
+    return found
+
+
+@inner
+def line_of_sight(own, ship, state):
+    """Turn [rad] on to the line-of-sight course, and a step of its integral ``state.integral``.
+
+    ILOS of Boerhaug, Pavlov and Pettersen (CDC 2008): heading = leg course - atan((y + sigma y_int) / lookahead), with y the
+    cross-track error and y_int' = lookahead y / (lookahead^2 + (y + sigma y_int)^2).
+    """
+    y = own.cross_track + ship.sigma * state.integral
+    state.integral += ship.dt * ship.lookahead * own.cross_track / (ship.lookahead * ship.lookahead + y * y)
+    own.wanted = wrap(own.leg - atan2(y, ship.lookahead))
+
+
+@inner
+def command(action, ship, turn, speed):
+    """Write the action [2] that asks for a heading ``turn`` rad to starboard of the present one and a speed [m/s]."""
+    action[0] = np.float32(clip(wrap(turn) / (0.5 * PI), -1.0, 1.0))
+    action[1] = np.float32(clip(2.0 * speed / ship.max_speed - 1.0, -1.0, 1.0))
+
+
+def record(dtype: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
+    """A record [1] of ``dtype`` with these values."""
+    out = np.zeros(1, dtype)
+    for name in dtype.names or ():
+        out[name] = values[name]
+    return out
+
+
+@dataclass(frozen=True)
+class NoTuning:
+    """A controller without parameters of its own."""
+
+    none: float = 0.0
+
+
+class Pilot:
+    """Base of the built-in controllers.
+
+    A subclass gives a kernel ``decide(obs [B, n], mask [B], ship [1], tuning [1], states [B], actions [B, 2])`` that writes
+    the actions of the rows of ``mask``, the dtype of what it remembers of an episode, and a dataclass of its parameters.
+    """
+
+    task: ClassVar[TaskConfig] = LOOKOUT
+    state: ClassVar[np.dtype[Any]] = np.dtype([("integral", "f8")])
+    TURN_RATE: ClassVar[float] = 0.1
+    SPEED_TIME: ClassVar[float] = 8.0
+
+    def __init__(self, tuning: Any = None) -> None:
+        self.tuning = self.default() if tuning is None else tuning
+
+    @staticmethod
+    def default() -> Any:
+        """The parameters."""
+        return NoTuning()
+
+    @staticmethod
+    def kernel() -> Any:
+        """The kernel that decides (imported late: it compiles)."""
+        raise NotImplementedError
+
+    # --- one of them -------------------------------------------------------------------------------------------------
+    def reset(self, info: Mapping[str, Any]) -> None:
+        """A new episode; ``info["scales"]`` says what observations mean."""
+        self.reset_batch(1, info)
+
+    def act(self, observation: Any) -> NDArray[np.float32]:
+        """The action for one observation: flat, or its Dict form."""
+        if isinstance(observation, Mapping):
+            observation = np.concatenate([observation["own"], np.ravel(observation["targets"])])
+        return self.act_batch(np.asarray(observation, np.float32)[None])[0].copy()
+
+    # --- many of them ------------------------------------------------------------------------------------------------
+    def reset_batch(self, num: int, info: Mapping[str, Any]) -> None:
+        """New episodes in ``num`` rows of one task."""
+        scales = info["scales"]
+        values = {name: scales.get(name, 0.0) for name in SHIP.names or ()}
+        cruise = scales["cruise_speed"]
+        values.update(cruise=cruise, dt=scales["control_interval"], sigma=SIGMA * cruise,
+                      lookahead=4.0 * scales["length"] + 3.0 * cruise,
+                      turn_rate=self.TURN_RATE, speed_time=self.SPEED_TIME)  # fmt: skip
+        self._ship = record(SHIP, values)
+        tuning = {key: np.asarray(value, float) for key, value in asdict(self.tuning).items()}
+        dtype = np.dtype([(key, "f8", value.shape) for key, value in tuning.items()], align=True)
+        self._tuning = record(dtype, tuning)
+        self._states = np.zeros(num, self.state)
+        self._actions = np.zeros((num, 2), np.float32)
+        self._all = np.ones(num, np.bool_)
+
+    def act_batch(self, observations: NDArray[np.float32], mask: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
+        """The actions [B, 2] for observations [B, n]; rows outside of ``mask`` [B] keep what they had.  A view."""
+        mask = self._all if mask is None else mask
+        self.kernel()(observations, mask, self._ship, self._tuning, self._states, self._actions)
+        return self._actions
