@@ -13,7 +13,8 @@ from usv_gym.envs.core import Core
 from usv_gym.policies import POLICIES, Controller, make_policy
 from usv_gym.policies.thrust_log import commands, per_tick, read_thrust_log
 from usv_gym.run import plan, run, shipped_log
-from usv_gym.tasks.task import OUTCOMES, TaskConfig, unflatten
+from usv_gym.tasks.task import OUTCOMES
+from usv_gym.voyage import task_of
 from usv_gym.world.vessel import load_vessel
 
 ROUTE = [[250, 0], [350, 200], [600, 250]]
@@ -39,16 +40,13 @@ def off_track(episode, route=ROUTE):
 
 def fly(name, num=60, **arguments):
     """Outcomes of the open seas 0 .. num - 1 with a policy, all in one batch."""
-    core = Core(num, source="open_sea", config=TaskConfig(action="heading_speed", flat=False), **arguments)
+    pilot = make_policy(name)
+    core = Core(num, source="open_sea", config=task_of(pilot), **arguments)
     core.reset(np.ones(num, bool), [np_random(seed)[0] for seed in range(num)])
-    pilots = [make_policy(name) for _ in range(num)]
-    for pilot in pilots:
-        pilot.reset({"scales": core.scales()})
+    pilot.reset_batch(num, {"scales": core.scales()})
     running = np.ones(num, bool)
     while running.any():
-        seen = unflatten(core.config, core.obs)
-        for b in np.flatnonzero(running):
-            core.actions[b] = pilots[b].act({key: value[b] for key, value in seen.items()})
+        core.actions[:] = pilot.act_batch(core.obs, running)
         core.step(running)
         running &= ~(core.terminated | core.truncated)
     return [OUTCOMES[outcome] for outcome in core.episodes["outcome"]]

@@ -31,3 +31,8 @@ def _solve(rising: Callable[[float], float], value: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if rising(middle) < value else (low, middle)
     return 0.5 * (low + high)
+
+
+def upper_bound(k: int, n: int, confidence: float = 0.95) -> float:
+    """What a rate lies below at a one-sided confidence, after ``k`` in ``n``: 0 in 1000 is below 0.3 % at 95 %."""
+    return clopper_pearson(k, n, 2.0 * confidence - 1.0)[1]

@@ -14,7 +14,7 @@ POLICIES: dict[str, tuple[str, str]] = {
     "avoid": ("avoid:Avoid", "the same, going around what the TDM reports; an honest reactive baseline"),
     "vo": ("vo:VelocityObstacles", "velocity obstacles with COLREGs (Kuwata et al. 2014)"),
     "sbmpc": ("sbmpc:SimulationBasedMPC", "simulation-based model predictive control (Johansen et al. 2016)"),
-    "apf": ("apf:PotentialField", "artificial potential field that turns with the rules (Ge and Cui 2002, Lyu and Yin 2019)"),
+    "apf": ("apf:PotentialField", "potential field that turns with the rules (Ge and Cui 2002, Lyu and Yin 2019)"),
     "idle": ("idle:Idle", "no thrust"),
 }
 #: drives the actuators from a recorded mission; needs no observation, so it is no controller

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..jit  import inner, kernel
+from ..jit import inner, kernel
 from ..trig import clip, sincos, wrap
 from ..units import DEG
 from .pilot import OWN, TARGET, Pilot, command, line_of_sight, look
@@ -105,8 +105,6 @@ class Avoid(Pilot):
     port dearer than starboard, more so near moving targets, and a steep price for coming closer to a target, soonest first,
     than a margin beyond its radius and its uncertainty.
     """
-
-    state = np.dtype([("integral", "f8"), ("last", "f8")])  # heading asked for last, off the course of the leg [rad]
 
     @staticmethod
     def default() -> Tuning:

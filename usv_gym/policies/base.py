@@ -1,7 +1,7 @@
 """Controllers: anything with ``reset(info)`` and ``act(observation) -> action``.
 
-The built-in ones look at the Dict form of the observation ``tracks``, that is, at the sensor picture and never at truth, and
-steer by ``heading_speed``, so that they drive every vessel.
+What a controller wants to see and do it says in attributes: ``action``, ``observation`` and ``flat``, or a whole ``task``.
+``Picture`` and ``Piloted`` are for writing one in Python; the built-in ones are kernels (policies/pilot.py).
 """
 
 from __future__ import annotations
@@ -22,6 +22,17 @@ class Controller(Protocol):
 
     def act(self, observation: Any) -> Any:
         """The action for an observation."""
+
+
+@runtime_checkable
+class BatchController(Controller, Protocol):
+    """A controller that also decides for many rows of one task at once."""
+
+    def reset_batch(self, num: int, info: dict[str, Any]) -> None:
+        """New episodes begin in ``num`` rows."""
+
+    def act_batch(self, observations: Any, mask: NDArray[np.bool_] | None = None) -> Any:
+        """The actions [B, n] for observations [B, ...]; those of rows outside of ``mask`` [B] are not used."""
 
 
 class Picture:

@@ -21,7 +21,8 @@ class Idle:
 
     def act(self, observation: Any) -> NDArray[np.float32]:
         """Zero demand."""
-        return self._zero[0]
+        zero: NDArray[np.float32] = self._zero[0]
+        return zero
 
     def reset_batch(self, num: int, info: Any) -> None:
         """The same for many rows."""

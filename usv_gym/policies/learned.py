@@ -75,8 +75,9 @@ class LearnedPolicy:
             action: NDArray[Any] = self.network.predict(observation, deterministic=True)[0]
         return action
 
-    #: actions [B, n] for observations [B, ...]; the network tells the two apart by their shape
-    act_batch = act
+    def act_batch(self, observations: Any, mask: Any = None) -> NDArray[Any]:
+        """The actions [B, n] for observations [B, ...]; the network tells one from many by the shape."""
+        return self.act(observations)
 
 
 @contextmanager

@@ -16,9 +16,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..jit  import inner
+from ..jit import inner
 from ..tasks.task import N_OWN, N_TARGET, TaskConfig
 from ..trig import PI, atan2, clip, sincos, wrap
+from ..world.encounter import SAFE, encounter
 
 #: what a lookout asks for: the 16 nearest targets within 2 NM, up to 50 kn and 500 m in radius
 LOOKOUT = TaskConfig(
@@ -48,6 +49,12 @@ TARGET = np.dtype([
     ("radius", "f8"),  # [m], with one standard deviation of its position
     ("moves", "i8"), ("code", "i8"),  # 1: under way; encounter with the own ship on its route
     ("dcpa", "f8"), ("tcpa", "f8"),  # with the own ship on its route [m], [s]
+], align=True)  # fmt: skip
+#: what a controller remembers of an episode
+STATE = np.dtype([
+    ("integral", "f8"),  # of the line of sight
+    ("last", "f8"), ("slowed", "f8"),  # heading asked for last, off leg or wanted course [rad]; 1 - share of cruising speed
+    ("waited", "f8"),  # [s] for which it has been turned away from where it wants to go
 ], align=True)  # fmt: skip
 
 MOVING = 0.7  #: [m/s] what makes a target one that the steering rules are about
@@ -99,6 +106,29 @@ def line_of_sight(own, ship, state):
 
 
 @inner
+def classify(own, ship, targets, found, dcpa, tcpa):
+    """Which encounter each target is, were the own ship to cruise along its leg; SAFE beyond dcpa [m] or tcpa [s].
+
+    Against the route and not against the course of the moment: what an encounter is does not change because one gives way.
+    """
+    s, c = sincos(own.leg)
+    for i in range(found):
+        t = targets[i]
+        t.code, t.dcpa, t.tcpa = encounter(0.0, 0.0, ship.cruise * c, ship.cruise * s, t.x, t.y, t.vx, t.vy)
+        if t.moves == 0 or t.dcpa - t.radius > dcpa or t.tcpa > tcpa:
+            t.code = SAFE
+
+
+@inner
+def wait(state, offset, ship):
+    """Count the time that the ship is turned away by more than 45 deg; it runs back as it is not.
+
+    Beside a vessel of the same speed a ship that only turns would never come back to its route: it has to let it go ahead.
+    """
+    state.waited = max(state.waited + (ship.dt if abs(offset) > 0.25 * PI else -ship.dt), 0.0)
+
+
+@inner
 def command(action, ship, turn, speed):
     """Write the action [2] that asks for a heading ``turn`` rad to starboard of the present one and a speed [m/s]."""
     action[0] = np.float32(clip(wrap(turn) / (0.5 * PI), -1.0, 1.0))
@@ -124,11 +154,10 @@ class Pilot:
     """Base of the built-in controllers.
 
     A subclass gives a kernel ``decide(obs [B, n], mask [B], ship [1], tuning [1], states [B], actions [B, 2])`` that writes
-    the actions of the rows of ``mask``, the dtype of what it remembers of an episode, and a dataclass of its parameters.
+    the actions of the rows of ``mask``, and a dataclass of its parameters.
     """
 
     task: ClassVar[TaskConfig] = LOOKOUT
-    state: ClassVar[np.dtype[Any]] = np.dtype([("integral", "f8")])
     TURN_RATE: ClassVar[float] = 0.1
     SPEED_TIME: ClassVar[float] = 8.0
 
@@ -154,7 +183,8 @@ class Pilot:
         """The action for one observation: flat, or its Dict form."""
         if isinstance(observation, Mapping):
             observation = np.concatenate([observation["own"], np.ravel(observation["targets"])])
-        return self.act_batch(np.asarray(observation, np.float32)[None])[0].copy()
+        action: NDArray[np.float32] = self.act_batch(np.asarray(observation, np.float32)[None])[0].copy()
+        return action
 
     # --- many of them ------------------------------------------------------------------------------------------------
     def reset_batch(self, num: int, info: Mapping[str, Any]) -> None:
@@ -169,7 +199,7 @@ class Pilot:
         tuning = {key: np.asarray(value, float) for key, value in asdict(self.tuning).items()}
         dtype = np.dtype([(key, "f8", value.shape) for key, value in tuning.items()], align=True)
         self._tuning = record(dtype, tuning)
-        self._states = np.zeros(num, self.state)
+        self._states = np.zeros(num, STATE)
         self._actions = np.zeros((num, 2), np.float32)
         self._all = np.ones(num, np.bool_)
 

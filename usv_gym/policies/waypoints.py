@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..jit  import kernel
+from ..jit import kernel
 from .pilot import OWN, TARGET, Pilot, command, line_of_sight, look
 
 
