@@ -56,9 +56,7 @@ class Model(BaseModel):
 
     def to_yaml(self) -> str:
         """YAML text that loads to an equal model."""
-        return yaml.dump(
-            self.dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120, default_flow_style=None
-        )
+        return dump_yaml(self.dump())
 
 
 ModelT = TypeVar("ModelT", bound=Model)
@@ -82,6 +80,11 @@ def suggestion(word: object, known: Iterable[str]) -> str:
 def json_schema(model: type[Model]) -> dict[str, Any]:
     """JSON Schema (2020-12) of what may be written in a file of this model, for editors."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
+
+
+def dump_yaml(data: Mapping[str, Any]) -> str:
+    """YAML text of plain data, in its order, that :func:`parse_yaml` reads back as it was."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120, default_flow_style=None)
 
 
 # --- documents -------------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ textbook answer and short (Rauch, Tung and Striebel 1965; constant velocity with
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -166,28 +167,37 @@ def hermite(t: Floats, t0: float, t1: float, x0: Floats, x1: Floats, v0: Floats,
                       + s**2 * (3 - 2 * s) * x1 + s**2 * (s - 1) * span * v1)  # fmt: skip
 
 
-def thin(t: Floats, x: Floats, v: Floats, psi: Floats, tolerance: float = TOLERANCE) -> NDArray[np.int64]:
-    """Indices of the knots to keep, so that the cubics between them pass all others within the tolerance [m].
+def split_where_worst(count: int, off: Callable[[int, int], Floats]) -> NDArray[np.int64]:
+    """Indices to keep of a sequence of ``count``, after Ramer, Douglas and Peucker.
 
-    Ramer's and Douglas and Peucker's way, with time: split where the curve is worst.
+    ``off(a, b)`` says how far each of the elements between a and b is off if they are left out, as a share of what may be.
     """
-    keep, todo = {0, len(t) - 1}, [(0, len(t) - 1)]
-    turned = np.unwrap(psi)
+    keep, todo = {0, count - 1}, [(0, count - 1)]
     while todo:
         a, b = todo.pop()
         if b - a < 2:
             continue
-        inner = slice(a + 1, b)
-        off = np.hypot(*(hermite(t[inner], t[a], t[b], x[a], x[b], v[a], v[b]) - x[inner]).T) / tolerance
-        share = (t[inner] - t[a]) / (t[b] - t[a])
-        swing = np.abs(turned[a] + share * (turned[b] - turned[a]) - turned[inner]) / HEADING_TOLERANCE
-        off = np.maximum(off, swing)
-        worst = int(np.argmax(off))
-        if off[worst] > 1.0:
+        error = off(a, b)
+        worst = int(np.argmax(error))
+        if error[worst] > 1.0:
             middle = a + 1 + worst
             keep.add(middle)
             todo += [(a, middle), (middle, b)]
     return np.array(sorted(keep))
+
+
+def thin(t: Floats, x: Floats, v: Floats, psi: Floats, tolerance: float = TOLERANCE) -> NDArray[np.int64]:
+    """Indices of the knots to keep, so that the cubics between them pass all others in time, within the tolerance [m]."""
+    turned = np.unwrap(psi)
+
+    def off(a: int, b: int) -> Floats:
+        inner = slice(a + 1, b)
+        apart = np.hypot(*(hermite(t[inner], t[a], t[b], x[a], x[b], v[a], v[b]) - x[inner]).T)
+        share = (t[inner] - t[a]) / (t[b] - t[a])
+        swing = np.abs(turned[a] + share * (turned[b] - turned[a]) - turned[inner])
+        return np.asarray(np.maximum(apart / tolerance, swing / HEADING_TOLERANCE))
+
+    return split_where_worst(len(t), off)
 
 
 def clean(table: Floats, place: Selection, *, max_gap: float = MAX_GAP, tolerance: float = TOLERANCE,

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO
 
 from ...config import ConfigError, suggestion
-from .fixes import NAN, Fixes, Harvest, Progress, is_ship, motion
+from .fixes import NAN, Harvest, Progress, is_ship
 
 #: what a column may be called, in lower case and without spaces, '#', '_'
 _NAMES: Mapping[str, Sequence[str]] = {
@@ -102,7 +102,6 @@ def read_own(path: Path, harvest: Harvest) -> None:
     ConfigError
         as ``read_csv``.
     """
-    fixes: Fixes = harvest.own
     for row, at, when in _rows(path, ("timestamp", "latitude", "longitude"), harvest, None):
         try:
             t = when(row[at["timestamp"]])
@@ -110,8 +109,7 @@ def read_own(path: Path, harvest: Harvest) -> None:
         except (ValueError, IndexError):
             harvest.odd["unreadable rows"] += 1
             continue
-        if harvest.selection.start <= t <= harvest.selection.end:
-            fixes.add(t, *place, *motion(*(_number(row, at, key) for key in ("sog", "cog", "heading"))))
+        harvest.add_own(t, *place, *(_number(row, at, key) for key in ("sog", "cog", "heading")))
 
 
 _Row = tuple[list[str], dict[str, int], Callable[[str], float]]

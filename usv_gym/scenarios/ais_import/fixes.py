@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +105,7 @@ class Harvest:
     last: float = -math.inf
     box: list[float] = field(default_factory=lambda: [90.0, -90.0, 180.0, -180.0])  #: south, north, west, east of all fixes
     first_here: float = math.inf  #: time of the earliest fix in the circle
+    first_own: float = math.inf  #: time of the earliest fix of the own ship
 
     def __post_init__(self) -> None:
         s = self.selection
@@ -136,7 +136,9 @@ class Harvest:
         if t > self.last:
             self.last = t
         s = self.selection
-        if mmsi != self.everywhere:
+        if mmsi == self.everywhere:
+            self.first_own = min(self.first_own, t)
+        else:
             north = latitude - s.latitude
             if north > self._near or -north > self._near:
                 return False
@@ -152,6 +154,13 @@ class Harvest:
             self.ships[mmsi] = Fixes()
         self.ships[mmsi].add(t, latitude, longitude, *motion(sog, cog, heading))
         return True
+
+    def add_own(self, t: float, latitude: float, longitude: float, sog: float, cog: float, heading: float) -> None:
+        """Keep a fix of the own ship, wherever it is."""
+        if abs(latitude) <= 90.0 and abs(longitude) <= 180.0:
+            self.first_own = min(self.first_own, t)
+            if self.selection.start <= t <= self.selection.end:
+                self.own.add(t, latitude, longitude, *motion(sog, cog, heading))
 
     def about(self, mmsi: int) -> Particulars:
         """The particulars of a station, to be filled."""
@@ -181,8 +190,3 @@ def is_ship(mmsi: int) -> bool:
 def utc(t: float) -> str:
     """A time as text; ``nothing`` when there is none."""
     return datetime.fromtimestamp(t, UTC).strftime("%Y-%m-%dT%H:%M:%SZ") if math.isfinite(t) else "nothing"
-
-
-def describe(path: Path) -> str:
-    """Name of a file in messages."""
-    return str(path)

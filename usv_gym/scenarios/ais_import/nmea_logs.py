@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from .csv_files import opened
-from .fixes import NAN, Harvest, Progress, is_ship, motion
+from .fixes import NAN, Harvest, Progress, is_ship
 
 _SENTENCE = re.compile(rb"[!$][A-Z\-]{2}[A-Z]{2,3}[0-9A-Z]?,[^!$*\\]*\*[0-9A-F]{2}$", re.IGNORECASE)
 _EVERY = 5_000  #: lines between two reports of progress
@@ -145,7 +145,8 @@ def _look_at_clock(body: bytes, clock: _Clock, harvest: Harvest) -> None:
         if kind == b"RMC" and field[2] == b"A":
             clock.running = _utc(field[1], field[9][4:6], field[9][2:4], field[9][:2])
             place = (_angle(field[3], field[4]), _angle(field[5], field[6]))
-            _own(harvest, clock.running, *place, *(float(text or NAN) for text in field[7:9]), NAN)
+            sog, cog = (float(text or NAN) for text in field[7:9])
+            harvest.add_own(clock.running, *place, sog, cog, NAN)
         elif kind == b"ZDA":
             clock.running = _utc(field[1], field[4][-2:], field[3], field[2])
         elif body[:5] == b"$PGHP" and field[1] == b"1":
@@ -167,11 +168,6 @@ def _angle(text: bytes, side: bytes) -> float:
     return (whole + minutes / 60.0) * (-1.0 if side in (b"S", b"W") else 1.0)
 
 
-def _own(harvest: Harvest, t: float, latitude: float, longitude: float, *sog_cog_heading: float) -> None:
-    if harvest.selection.start <= t <= harvest.selection.end and abs(latitude) <= 90.0 and abs(longitude) <= 180.0:
-        harvest.own.add(t, latitude, longitude, *motion(*sog_cog_heading))
-
-
 def time_of_fix(received: float, second: int) -> float:
     """When a fix was made [s since 1970], from the receiver's clock and the UTC second that the report carries.
 
@@ -191,7 +187,7 @@ def _use(message: Any, own: bool, t: float, harvest: Harvest) -> None:
         t = time_of_fix(t, message.second)
         fix = t, message.lat, message.lon, message.speed, message.course, message.heading
         if own:
-            _own(harvest, *fix)
+            harvest.add_own(*fix)
         elif not is_ship(mmsi):
             harvest.odd["position reports of stations that are no ships"] += 1
         elif harvest.add(mmsi, *fix):
