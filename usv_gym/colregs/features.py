@@ -145,7 +145,7 @@ def _observe(seen, e, p, pair, t, turn, change, turn_rate, acceleration, ref):
 
 
 @inner
-def _apart(hulls, a, k, f, own, other, l1, b1, l2, b2):
+def hull_distance_at(hulls, a, k, f, own, other, l1, b1, l2, b2):
     """Hull distance [m] a fraction f of the way from sample a to k."""
     return hull_clearance(
         hulls,
@@ -172,7 +172,7 @@ def _approach(nearest, hulls, a, k, f, t, own, other, l1, b1, l2, b2):
     rn += f * (other[k, 0] - own[k, 0] - rn)
     re += f * (other[k, 1] - own[k, 1] - re)
     if math.hypot(rn, re) < nearest[0] + 0.5 * (math.hypot(l1, b1) + math.hypot(l2, b2)):
-        d = _apart(hulls, a, k, f, own, other, l1, b1, l2, b2)
+        d = hull_distance_at(hulls, a, k, f, own, other, l1, b1, l2, b2)
         if d < nearest[0]:
             nearest[0] = d
             nearest[1] = t[a] + f * (t[k] - t[a])
@@ -185,7 +185,7 @@ def _nearer(e, hulls, k, f, t, own, other, l1, b1, l2, b2, course1, course2):
     n1, e1 = own[a, 0] + f * (own[k, 0] - own[a, 0]), own[a, 1] + f * (own[k, 1] - own[a, 1])
     n2, e2 = other[a, 0] + f * (other[k, 0] - other[a, 0]), other[a, 1] + f * (other[k, 1] - other[a, 1])
     when = t[a] + f * (t[k] - t[a])
-    gap = _apart(hulls, a, k, f, own, other, l1, b1, l2, b2)
+    gap = hull_distance_at(hulls, a, k, f, own, other, l1, b1, l2, b2)
     if gap < e.clearance:
         e.clearance, e.clearance_time = gap, when
     d = math.hypot(n2 - n1, e2 - e1)
