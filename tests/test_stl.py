@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from usv_gym.colregs.oracle import decide, robustness
-from usv_gym.colregs.requirements import evaluate, read_requirements, requirement, verdict_word
-from usv_gym.colregs.signals import NAMES, SIGNALS, signals
+from usv_gym.colregs.oracle import robustness
+from usv_gym.colregs.requirements import read_requirements, requirement
+from usv_gym.colregs.signals import NAMES
 from usv_gym.colregs.stl import compile_formula
 from usv_gym.colregs.stl_kernels import robustness as kernel_robustness
 from usv_gym.config import ConfigError
