@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from meeting import meeting
 
 from usv_gym.colregs import scores as s
 from usv_gym.colregs.params import PUBLISHED, Params
@@ -17,33 +18,6 @@ from usv_gym.config import ConfigError, Document, validate
 from usv_gym.world.encounter import Encounter
 
 DEG = math.pi / 180.0
-#: in these cases the vessels are points, so that the distance of the hulls is that of the centres; Set A's R_col is added to it
-POINT = 1e-6
-
-
-def course(legs, dt=1.0):
-    """[T, 3] N, E, psi of a vessel that sails legs of (seconds, course [deg], speed [m/s]) from the origin."""
-    position, track = np.zeros(2), []
-    for seconds, degrees, speed in legs:
-        for _ in range(round(seconds / dt)):
-            track.append([*position, degrees * DEG])
-            position = position + speed * dt * np.array([math.cos(degrees * DEG), math.sin(degrees * DEG)])
-    return np.array(track)
-
-
-def meeting(own, other, offset, *, size=POINT, dt=1.0):
-    """Two vessels as a trajectory; ``offset`` [N, E] is where the other starts."""
-    a, b = course(own, dt), course(other, dt)
-    n = min(len(a), len(b))
-    b[:, :2] += offset
-    eta = np.stack([a[:n], b[:n]], axis=1)
-    x = Trajectory.from_tracks(dt * np.arange(n), eta, np.full(2, size), np.full(2, size))
-    # a course change shows in the sample it happens at
-    psi = eta[..., 2]
-    v = np.hypot(*np.moveaxis(np.diff(eta[..., :2], axis=0, append=2 * eta[-1:, :, :2] - eta[-2:-1, :, :2]), -1, 0)) / dt
-    x.velocity[0] = v[..., None] * np.stack([np.cos(psi), np.sin(psi)], axis=-1)
-    return x
-
 
 def one(x, params=PUBLISHED):
     verdict = judge(x, params)

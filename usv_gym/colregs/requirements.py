@@ -152,7 +152,7 @@ def _by_kernels(
     depth = max(program.depth for program in programs)
     of_pair = np.array([one.of_pair for one in requirements], np.int8)
     margins(*arguments_of(x, params), *work_space(T), np.zeros((len(NAMES), T)), of_pair, ops, arguments, starts,
-            np.zeros((depth + 1, T)), np.zeros((3, T)), out, when)  # fmt: skip
+            np.zeros((depth + 1, T)), np.zeros((3, T)), -1, out, when)  # fmt: skip
     return out, when
 
 

@@ -154,23 +154,13 @@ def write_signals(p, d, x, n, b, i, j, ready, course1, speed1, course2, speed2, 
 
 
 @kernel
-def signals_of(params, d, x, steps, ready, own, b, j, work, hulls, pairs, out):
-    """Write the signals out [S, T] of episode b and ship j (-1: of the episode alone)."""
-    n, i = steps[b], own[b]
-    slow = 0.25 * params[0].moving
-    courses(x[2][b, :, i], x[1][b, :, i], n, slow, work[0], work[1])
-    if j >= 0:
-        courses(x[2][b, :, j], x[1][b, :, j], n, slow, work[2], work[3])
-    write_signals(params[0], d, x, n, b, i, j, ready[b], work[0], work[1], work[2], work[3], hulls, pairs[0], out)
-
-
-@kernel
 def margins(params, d, x, steps, ready, own, work, hulls, pairs, signals, of_pair, ops, arguments, starts, stack, queue,
-            out, when):  # fmt: skip
+            only, out, when):  # fmt: skip
     """Margins of R formulas: out [R, B, V] robustness, NaN where there is no such ship; when [R, B, V] the sample that decided.
 
     A formula of the episode alone stands in the column of the own ship.  ops [n], arguments [n, 2] hold all programs one after
-    the other, starts [R + 1] where each begins; of_pair [R].
+    the other, starts [R + 1] where each begins; of_pair [R].  signals [S, T] is left with those of the last pair; only: the
+    one column to look at, -1 for all.
     """
     out[:] = math.nan
     when[:] = -1
@@ -179,6 +169,8 @@ def margins(params, d, x, steps, ready, own, work, hulls, pairs, signals, of_pai
         n, i = steps[b], own[b]
         courses(x[2][b, :, i], x[1][b, :, i], n, slow, work[0], work[1])
         for j in range(out.shape[2]):
+            if only >= 0 and j != only:
+                continue
             seen = j == i
             for k in range(n):
                 if seen:
@@ -198,21 +190,24 @@ def margins(params, d, x, steps, ready, own, work, hulls, pairs, signals, of_pai
 
 
 def arguments_of(x: Trajectory, params: Params) -> tuple[Any, Any, Any, Any, Any, Any]:
-    """The leading arguments of both kernels for a trajectory."""
+    """The leading arguments of the kernel for a trajectory."""
     d = np.array([params.r_pref, params.r_min, params.r_nm]) - params.r_col
     arrays = (x.t, x.eta, x.velocity, x.active, x.tracked, x.obstacle, x.length, x.beam, x.touched, x.arrived)
     return params.record(), d, arrays, x.steps, under_way(x), x.own
 
 
 def work_space(T: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Work space of both kernels for T samples."""
+    """Its work space for T samples."""
     return np.zeros((4, T)), np.zeros((2, 5, 2)), np.zeros(1, pair_dtype())
 
 
 def signals(x: Trajectory, b: int, ship: int = -1, params: Params | None = None) -> dict[str, Floats]:
     """Signals of episode b by name, [steps[b]] each; those of a pair are there if ``ship`` is a vessel slot."""
-    T = x.t.shape[1]
+    T, column = x.t.shape[1], int(x.own[b]) if ship < 0 else ship
     out = np.full((len(NAMES), T), np.nan)
-    signals_of(*arguments_of(x, params or Params()), b, ship, *work_space(T), out)
+    none = np.zeros(0, np.int64)
+    margins(*arguments_of(x.rows(slice(b, b + 1)), params or Params()), *work_space(T), out, none.astype(np.int8), none,
+            np.zeros((0, 2)), np.zeros(1, np.int64), np.zeros((1, T)), np.zeros((3, T)), column,
+            np.zeros((0, 1, x.vessels)), np.zeros((0, 1, x.vessels), np.int64))  # fmt: skip
     n = int(x.steps[b])
     return {s.name: out[i, :n] for i, s in enumerate(SIGNALS) if ship >= 0 or not s.of_pair}

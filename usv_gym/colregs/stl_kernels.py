@@ -170,13 +170,11 @@ def worst_sample(ops, arguments, signals, n, stack, queue):
 
     Of any other formula the sample is 0: the whole episode decides.
     """
-    last = ops.shape[0] - 1
-    if ops[last] == _ALWAYS and arguments[last, 1] < 0:
-        robustness(ops[:last], arguments, signals, n, stack, queue)
-        at = 0
-        for i in range(n):
-            if stack[0, i] < stack[0, at]:
-                at = i
-        return stack[0, at], at
-    robustness(ops, arguments, signals, n, stack, queue)
-    return stack[0, 0], np.int64(0)
+    n_ops = ops.shape[0]
+    always = ops[n_ops - 1] == _ALWAYS and arguments[n_ops - 1, 1] < 0
+    robustness(ops[: n_ops - 1] if always else ops, arguments, signals, n, stack, queue)
+    at = 0
+    for i in range(n if always else 1):
+        if stack[0, i] < stack[0, at]:
+            at = i
+    return stack[0, at], at

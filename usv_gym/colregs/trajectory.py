@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..world.state import KIND_ISLET
+from .sample import take_sample
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -29,15 +29,15 @@ class Trajectory:
     velocity: Floats  # [B, T, V, 2] N, E over ground [m/s] {n}
     active: Bools  # [B, T, V]
     tracked: Bools  # [B, T, V] the own ship's picture holds this vessel
-    obstacle: Floats  # [B, T] hull of the own ship to the nearest obstacle [m]; inf without any
+    obstacle: Floats  # [B, T] hull of the own ship to the nearest obstacle or land [m]; inf without any
     demand: Floats  # [B, T, 2] surge and yaw asked of the thrusters, each in [-1, 1]; NaN where there are none
     length: Floats  # [B, V] m
     beam: Floats  # [B, V] m
     own: Ints  # [B] vessel slot of the own ship
     closest: Floats  # [B, V] smallest hull distance, between samples too [m]; inf where not swept
-    closest_obstacle: Floats  # [B] the same to the obstacles
+    closest_obstacle: Floats  # [B] the same to obstacles and land
     touched: Ints  # [B] source that was touched first: vessel slot, or V + obstacle slot; -1: none
-    aground: Bools  # [B] what was touched is land
+    aground: Bools  # [B] land, or an islet, was touched
     arrived: Bools  # [B] the route is done
     route: Floats  # [B] length of the route [m]; 0 without one
     speed: Floats  # [B] speed at which the route is meant to be sailed [m/s]; 0 unknown
@@ -125,33 +125,8 @@ class TrajectoryRecorder:
 
     def sample(self, mask: Bools | None = None) -> None:
         """Take a sample of the rows of ``mask`` [B] (all)."""
-        x, w = self.trajectory, self._worlds
-        rows = np.arange(len(x)) if mask is None else np.flatnonzero(mask)
-        at, own = (rows, x.steps[rows]), x.own[rows]
-        vessels, V = w["vessels"], x.vessels
-        x.t[at] = w["tick"][rows] * w["dt"][rows]
-        x.eta[at] = vessels["eta"][rows]
-        x.velocity[at] = vessels["velocity"][rows]
-        x.active[at] = vessels["active"][rows] != 0
-        x.tracked[at] = w["picture"]["id"][rows, 0, :V] != 0
-        there = w["obstacles"]["active"][rows] != 0
-        x.obstacle[at] = np.where(there, w["safety"]["distance"][rows, 0, V:], np.inf).min(axis=1, initial=np.inf)
-        x.demand[at] = demand(w["plants"], rows, vessels["plant"][rows, own])
-        swept = w["safety"]["closest"][rows, 0]
-        x.closest[rows], x.closest_obstacle[rows] = swept[:, :V], swept[:, V:].min(axis=1, initial=np.inf)
-        touched = w["safety"]["collided_with"][rows, 0]
-        x.touched[rows] = touched
-        x.aground[rows] = (touched >= V) & (w["obstacles"]["kind"][rows, np.maximum(touched - V, 0)] == KIND_ISLET)
-        x.arrived[rows] = w["routes"]["done"][rows, own] != 0
-        x.steps[rows] += 1
-
-
-def demand(plants: NDArray[Any], rows: Ints, plant: NDArray[Any]) -> Floats:
-    """Surge and yaw demands [n, 2] in [-1, 1] that the commands of plants [n] amount to; NaN where there is no plant."""
-    at = (rows, np.maximum(plant, 0))
-    command, surge, yaw, nozzle = (plants[name][at] for name in ("command", "mix_surge", "mix_yaw", "mix_nozzle"))
-    rpm = command[..., 0] * np.where(plants["reverse_by_bucket"][at][:, None] != 0, command[..., 2], 1.0)
-    weight = np.maximum((surge**2).sum(1), 1e-9), np.maximum((yaw**2 + nozzle**2).sum(1), 1e-9)
-    out = np.stack([(surge * rpm).sum(1) / weight[0],
-                    (yaw * command[..., 0] + nozzle * command[..., 1]).sum(1) / weight[1]], axis=1)  # fmt: skip
-    return np.where(plant[:, None] >= 0, np.clip(out, -1.0, 1.0), np.nan)
+        x = self.trajectory
+        take_sample(
+            self._worlds, np.ones(len(x), np.bool_) if mask is None else mask, x.steps, x.own, x.t, x.eta, x.velocity, x.active,
+            x.tracked, x.obstacle, x.demand, x.closest, x.closest_obstacle, x.touched, x.aground, x.arrived,
+        )  # fmt: skip
