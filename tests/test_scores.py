@@ -98,10 +98,10 @@ def test_rule_14_a_clear_turn_to_starboard_is_perfect():
     assert e["seen"]["manoeuvre_range"] == pytest.approx(1500.0)
     # r = 192.8 + 35 > 200 m: S_r = 1.  40 > 30 deg: P_na = P_nsb = 0; beyond R3: P_delay = 0; port to port: P_sts = 0
     assert v["safety"] == pytest.approx(1.0)
-    assert v["s14"] == pytest.approx(1.0)
+    assert v["r14"] == pytest.approx(1.0)
     # speed was kept: S8 = S_app = 1 - 0.5
-    assert v["s8"] == pytest.approx(0.5)
-    assert all(math.isnan(v[name]) for name in ("s13", "s15", "s16", "s17"))
+    assert v["r8"] == pytest.approx(0.5)
+    assert all(math.isnan(v[name]) for name in ("r13", "r15", "r16", "r17"))
     assert verdict.row(0)["head_on"] == 1
 
 
@@ -113,16 +113,16 @@ def test_rule_14_late_and_small():
     assert v["p_course"] == pytest.approx(1 - (18 / 28) ** 2)
     assert v["p_delay"] == pytest.approx(0.7, abs=1e-6)
     assert v["p_side"] == pytest.approx(0.0, abs=1e-6)
-    assert v["s14"] == pytest.approx((1 - 0.4 * 0.75) * (18 / 28) ** 2 * 0.3, abs=1e-6)
+    assert v["r14"] == pytest.approx((1 - 0.4 * 0.75) * (18 / 28) ** 2 * 0.3, abs=1e-6)
 
 
 def test_rule_14_to_port_is_starboard_to_starboard():
     # the mirror image of the perfect case: P_sts = 1, P_nsb = 1: 1 - 0.4 - 0.6 = 0
     x = meeting([(100, 0, 5), (60, -40, 5), (300, 0, 5)], [(500, 180, 5)], [2500, 0])
     verdict, v, e = one(x)
-    assert v["s14"] == pytest.approx(0.0, abs=1e-9)
+    assert v["r14"] == pytest.approx(0.0, abs=1e-9)
     assert v["safety"] == pytest.approx(1.0)
-    why = s.reasons(e, PUBLISHED, "s14")
+    why = s.reasons(e, PUBLISHED, "r14")
     assert [text for _, _, text in why][:2] == ["did not pass port to port", "turned 0 deg to starboard at most"]
     assert why[0][0] == pytest.approx(0.6)
     assert why[0][1] == pytest.approx(e["cpa_time"])
@@ -143,8 +143,8 @@ def test_rules_15_and_16_give_way_passing_astern():
     assert (e["cpa_alpha"] / DEG, e["cpa_beta"] / DEG) == pytest.approx((-135.0, -45.0))
     assert v["ahead15"] == 0.0
     assert v["safety"] == 1.0
-    assert v["s16"] == pytest.approx(0.5)  # S_safety S_app: 60 deg are apparent, speed was kept
-    assert v["s15"] == pytest.approx(0.5)
+    assert v["r16"] == pytest.approx(0.5)  # S_safety S_app: 60 deg are apparent, speed was kept
+    assert v["r15"] == pytest.approx(0.5)
 
 
 def test_rule_15_crossing_ahead_costs_a_half():
@@ -155,8 +155,8 @@ def test_rule_15_crossing_ahead_costs_a_half():
     assert Encounter(e["code"]) is Encounter.CROSSING_GIVE_WAY
     assert -25.0 < e["cpa_alpha"] / DEG < 165.0
     assert v["ahead15"] == 1.0
-    assert v["s15"] == pytest.approx(max(v["s16"] - 0.5, 0.0))
-    assert v["s16"] == pytest.approx(v["safety"] * 0.5)  # dU is a *reduction* of speed: none
+    assert v["r15"] == pytest.approx(max(v["r16"] - 0.5, 0.0))
+    assert v["r16"] == pytest.approx(v["safety"] * 0.5)  # dU is a *reduction* of speed: none
 
 
 def test_rule_16_by_speed_alone():
@@ -165,7 +165,7 @@ def test_rule_16_by_speed_alone():
     _, v, e = one(x)
     assert (v["p_course"], v["p_speed"]) == (1.0, 0.0)
     assert e["seen"]["slowed"] == pytest.approx(0.5)
-    assert v["s8"] == pytest.approx(0.5)
+    assert v["r8"] == pytest.approx(0.5)
 
 
 def test_rule_17_standing_on_is_perfect_and_a_deviation_costs():
@@ -173,12 +173,12 @@ def test_rule_17_standing_on_is_perfect_and_a_deviation_costs():
     other = [(100, 90, 5), (60, 150, 5), (400, 90, 5)]
     _, v, e = one(meeting([(600, 0, 5)], other, [1500, -1500]))
     assert Encounter(e["code"]) is Encounter.CROSSING_STAND_ON
-    assert v["s17"] == v["s15"] == pytest.approx(1.0)
-    assert math.isnan(v["s16"])
+    assert v["r17"] == v["r15"] == pytest.approx(1.0)
+    assert math.isnan(v["r16"])
     # 16 deg in stage 2, from 50 s on: P_st2 = 0.5 (16 - 2) / 28 = 0.25; P_st3 is relative to the first sample of stage 3: 0
     _, v, e = one(meeting([(50, 0, 5), (550, 16, 5)], other, [1500, -1500]))
     assert (v["p_stage2"], v["p_stage3"]) == pytest.approx((0.25, 0.0))
-    assert v["s17"] == pytest.approx(0.75 * v["safety"])
+    assert v["r17"] == pytest.approx(0.75 * v["safety"])
     assert e["seen"]["turn2_time"] == pytest.approx(50.0)
 
 
@@ -189,11 +189,11 @@ def test_rule_17c_turning_to_port_for_a_ship_on_the_port_side():
     _, v, e = one(x)
     assert e["seen"]["stage4_time"] == pytest.approx(300 - 200 / (5 * math.sqrt(2)), abs=1.0)
     assert v["p_port"] == 1.0
-    assert v["s17"] == 0.0
-    assert any(text == "turned to port for a ship on the port side" for _, _, text in s.reasons(e, PUBLISHED, "s17"))
+    assert v["r17"] == 0.0
+    assert any(text == "turned to port for a ship on the port side" for _, _, text in s.reasons(e, PUBLISHED, "r17"))
     # to starboard it is no fault of Rule 17 c, and stage 4 has no other
     x = meeting([(at, 0, 5), (200, 20, 5)], [(600, 90, 5)], [1500, -1500])
-    assert one(x)[1]["s17"] == pytest.approx(one(x)[1]["safety"])
+    assert one(x)[1]["r17"] == pytest.approx(one(x)[1]["safety"])
 
 
 def test_rule_13_overtaking():
@@ -203,15 +203,15 @@ def test_rule_13_overtaking():
     assert Encounter(e["code"]) is Encounter.OVERTAKING
     assert e["cpa_range"] == pytest.approx(320 * math.sin(40 * DEG), rel=1e-4)
     assert v["ahead13"] == 0.0  # abeam: alpha = 90 deg
-    assert v["s13"] == v["s16"] == pytest.approx(0.5)
+    assert v["r13"] == v["r16"] == pytest.approx(0.5)
     # being overtaken: the other keeps clear, we keep course and speed
     _, v, e = one(meeting([(500, 0, 3)], own, [-1100, 0]))
     assert Encounter(e["code"]) is Encounter.OVERTAKEN
-    assert v["s13"] == v["s17"] == pytest.approx(1.0)
+    assert v["r13"] == v["r17"] == pytest.approx(1.0)
     # and with 44 deg to starboard in stage 3 (range < 700 m): P_st3 = 0.5
     _, v, e = one(meeting([(130, 0, 3), (370, 44, 3)], own, [-1100, 0]))
     assert v["p_stage3"] == pytest.approx(0.5)
-    assert v["s13"] == pytest.approx(0.5 * v["safety"])
+    assert v["r13"] == pytest.approx(0.5 * v["safety"])
 
 
 def test_a_collision_scores_zero_safety_but_rule_14_says_nothing_of_it():
@@ -223,7 +223,7 @@ def test_a_collision_scores_zero_safety_but_rule_14_says_nothing_of_it():
     _, v, e = one(x)
     assert e["contact"] == 1
     assert v["safety"] == 0.0
-    assert v["s14"] > 0.0
+    assert v["r14"] > 0.0
 
 
 # --- properties ------------------------------------------------------------------------------------------------------
@@ -251,7 +251,7 @@ def test_mirror_image_swaps_crossing_roles_and_nothing_else(track):
     np.testing.assert_allclose(a.scores["safety"], b.scores["safety"], atol=1e-9)
     # Rule 13 knows no side
     overtaking = np.isin(a.encounters["code"], (Encounter.OVERTAKING, Encounter.OVERTAKEN))
-    np.testing.assert_allclose(a.scores["s13"][overtaking], b.scores["s13"][overtaking], atol=1e-9)
+    np.testing.assert_allclose(a.scores["r13"][overtaking], b.scores["r13"][overtaking], atol=1e-9)
     np.testing.assert_allclose(a.parts["p_course"], b.parts["p_course"], atol=1e-9)
 
 
@@ -272,7 +272,7 @@ def test_a_wider_berth_and_a_larger_turn_never_score_worse():
     last = -1.0
     for turn in (5, 10, 15, 20, 25, 30, 35):
         x = meeting([(100, 0, 5), (60, turn, 5), (300, 0, 5)], [(500, 180, 5)], [2500, 0])
-        score = one(x)[1]["s14"]
+        score = one(x)[1]["r14"]
         assert score >= last
         last = score
 

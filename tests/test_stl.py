@@ -138,8 +138,8 @@ def test_the_catalogue_covers_the_rules_and_is_judged_by_the_kernels():
 
 CASES = constructed()
 #: from which score on a role counts as done well: acting by course alone, set A gives 0.5 at most (Eq 9)
-WELL = {"head_on": ("s14", 0.75), "crossing_give_way": ("s15", 0.45), "crossing_stand_on": ("s15", 0.75),
-        "overtaking": ("s13", 0.45), "overtaken": ("s13", 0.75)}  # fmt: skip
+WELL = {"head_on": ("r14", 0.75), "crossing_give_way": ("r15", 0.45), "crossing_stand_on": ("r15", 0.75),
+        "overtaking": ("r13", 0.45), "overtaken": ("r13", 0.75)}  # fmt: skip
 
 
 def test_there_are_40_clear_encounters():
@@ -224,7 +224,7 @@ def test_kernels_agree_with_rtamt_on_500_episodes(capsys):
             compared += int(np.isfinite(ours.value).sum())
             # where requirements and scores part: listed, not asserted (docs/verdict.md says why they may)
             verdict, (value, _, _) = judge(x), ours.worst()
-            for rule, score in ((14, "s14"), (15, "s15"), (17, "s17")):
+            for rule, score in ((14, "r14"), (15, "r15"), (17, "r17")):
                 of_rule = [r for r, id in enumerate(ours.ids) if catalogue[id].rule == rule]
                 bad = (np.nan_to_num(value[of_rule], nan=1.0) < 0).any(axis=0)
                 low = verdict.episodes[f"{score}_min"] < 0.4

@@ -23,8 +23,8 @@ from .params import Params
 
 Floats = NDArray[np.float64]
 
-#: scores of an encounter; ``s<k>`` is of Rule k
-SCORES = ("safety", "s8", "s13", "s14", "s15", "s16", "s17")
+#: scores of an encounter; ``r<k>`` is of Rule k
+SCORES = ("safety", "r8", "r13", "r14", "r15", "r16", "r17")
 #: what they are made of: a share of 1 that is lost (p_*, ahead*), or kept (s_*)
 PARTS = ("s_range", "s_angle", "p_course", "p_speed", "s_apparent", "p_delay", "p_starboard", "p_side", "p_stage2", "p_stage3",
          "p_port", "ahead13", "ahead15")  # fmt: skip
@@ -134,12 +134,12 @@ def combine(code: NDArray[Any], p: dict[str, Floats]) -> dict[str, Floats]:
 
     return {
         "safety": safety,
-        "s8": of((acts, s8)),
-        "s13": of((overtakes, s16 - 0.3 * p["ahead13"]), (overtaken, s17)),  # Eq 25
-        "s14": of((head_on, s14)),
-        "s15": of((gives_way, s16 - 0.5 * p["ahead15"]), (stands_on, s17)),  # Eq 31
-        "s16": of((overtakes | gives_way, s16)),
-        "s17": of((overtaken | stands_on, s17)),
+        "r8": of((acts, s8)),
+        "r13": of((overtakes, s16 - 0.3 * p["ahead13"]), (overtaken, s17)),  # Eq 25
+        "r14": of((head_on, s14)),
+        "r15": of((gives_way, s16 - 0.5 * p["ahead15"]), (stands_on, s17)),  # Eq 31
+        "r16": of((overtakes | gives_way, s16)),
+        "r17": of((overtaken | stands_on, s17)),
     }
 
 
