@@ -17,7 +17,7 @@ LAYERS = (
     "units resources config jit trig rng",  # no domain knowledge
     "world",  # truth
     "sensors traffic",  # the picture; how ships move
-    "engine scenarios",  # one tick; where worlds come from
+    "events engine scenarios",  # one tick; where worlds come from
     "tasks metrics colregs policies",  # the decision problem, how it is judged, who decides
     "render.palette replay render envs",  # archive and outputs, map, faces
     "voyage run play live sb3 train traffic_v0 campaign hil",  # jobs and further faces

@@ -232,6 +232,7 @@ _EXPECTED = {
     "bool_type": "expected true or false",
     "string_type": "expected text",
     "model_type": "expected a mapping of keys",
+    "model_attributes_type": "expected a mapping of keys",
     "dict_type": "expected a mapping of keys",
     "tuple_type": "expected a list",
     "list_type": "expected a list",
@@ -251,7 +252,7 @@ def _problems(error: ValidationError, document: Document) -> Iterator[str]:
         kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
         if kind == "default_factory_not_called":  # a consequence of another error
             continue
-        path = _keys_only(detail["loc"], document.data)
+        path = _keys_only(detail["loc"], document.data, missing=kind == "missing")
         if kind == "unknown_key":
             for key in context["keys"]:
                 yield f"{document.where((*path, key))}: unknown key{suggestion(key, context['known'])}"
@@ -268,7 +269,7 @@ def _problems(error: ValidationError, document: Document) -> Iterator[str]:
             yield f"{document.where(path)}: {message}, got {got}{more if more.startswith('; did') else ''}"
 
 
-def _keys_only(location: Sequence[str | int], data: Any) -> KeyPath:
+def _keys_only(location: Sequence[str | int], data: Any, missing: bool) -> KeyPath:
     """The parts of pydantic's location that are keys of the data (others are names of union branches)."""
     path: list[str | int] = []
     node = data
@@ -277,7 +278,7 @@ def _keys_only(location: Sequence[str | int], data: Any) -> KeyPath:
             if part in node:
                 path.append(part)
                 node = node[part]
-            elif depth == len(location) - 1 and part != "[key]":  # a missing key
+            elif missing and depth == len(location) - 1:
                 path.append(part)
         elif isinstance(node, list | tuple) and isinstance(part, int):
             path.append(part)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from .events import run_events
 from .jit import kernel, spliced
 from .sensors.nav import navigate
 from .sensors.schedule import first_events, sense
@@ -67,6 +68,7 @@ def end_frame(w, land, tracks):
         j = w.observer[o]
         if w.vessels.model[j] == MODEL_3DOF or w.vessels.controlled[j]:
             follow_route(w, j)
+    run_events(w)
     begin_frame(w)
     replay(w, tracks, w.frame_ticks * w.dt)
     steer(w, w.frame_ticks * w.dt)
@@ -79,6 +81,7 @@ def reset_world(w, land, tracks):
     w.traffic_tick = 0
     weather_reset(w)
     begin_replay(w, tracks)
+    run_events(w)
     begin_frame(w)
     replay(w, tracks, w.frame_ticks * w.dt)
     steer(w, w.frame_ticks * w.dt)

@@ -23,6 +23,7 @@ from .replay.recorder import Recorder
 from .scenarios.commands import Commands, Notice
 from .scenarios.schema import Scenario
 from .tasks.task import OUTCOMES, TaskConfig, unflatten
+from .world.state import EVENTS
 
 _ONE = np.ones(1, np.bool_)
 BY_HAND = "by hand"  #: the policy of a mission that the user steers
@@ -140,6 +141,8 @@ class Voyage:
         self.recorder.sample(core.worlds)
         notices = self.commands.notices()
         for notice in notices:
+            if notice.kind in EVENTS:
+                continue  # the recorder sees them by itself
             self.recorder.event(notice.t, notice.kind, notice.source, notice.text or notice.id)
         return notices
 

@@ -149,7 +149,8 @@ class Core:
             )
         family = FAMILIES[scenario.family.name] if scenario.family else None
         slots = None if family is None else capacity(
-            max(family.vessels, 1 + len(scenario.ships)), max(family.obstacles, len(scenario.obstacles))
+            max(family.vessels, 1 + len(scenario.ships)),
+            max(family.obstacles, len(scenario.obstacles)) + len(scenario.phantoms()),
         )  # fmt: skip
         worlds, names = build_worlds(scenario, self.num, capacity=slots)
         # nothing is changed until all of it is known to be right

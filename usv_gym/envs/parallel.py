@@ -117,7 +117,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         tasks = [task_record(c, f, simulation.control_ticks, steps) for c, f in zip(self.configs, facts, strict=True)]
         self._tasks = np.concatenate(tasks + [tasks[0]] * (MAX_AGENTS - agents))
         V, M = next(c for c in CAPACITIES[1:] if MAX_AGENTS + len(self.scenario.ships) <= c[0]
-                    and 12 + len(self.scenario.obstacles) <= c[1])  # fmt: skip
+                    and 12 + len(self.scenario.obstacles) + len(self.scenario.phantoms()) <= c[1])  # fmt: skip
         self.worlds, self.names = build_worlds(
             self.scenario, 1, capacity=(V, M), observers=range(MAX_AGENTS), agents=MAX_AGENTS
         )

@@ -256,7 +256,10 @@ def _events(episode: Episode) -> list[dict[str, Any]]:
     events = [
         {"t": e["t"], "kind": e["kind"], "id": e.get("id", -1), "text": e.get("text", "")} for e in episode.events
     ]
+    told = {e["kind"] for e in events}
     for k, fault in enumerate(FAULTS):
+        if fault in told:
+            continue
         state = episode.faults[:, k].astype(int)
         for i in np.flatnonzero(np.diff(state, prepend=0)):
             events.append({"t": episode.t[i], "kind": fault, "id": -1, "text": "begins" if state[i] else "ends"})

@@ -7,6 +7,7 @@ the column tables.
 from __future__ import annotations
 
 import csv
+import dataclasses
 import datetime
 import io
 import json
@@ -27,6 +28,7 @@ from ..metrics.errors import (
 )
 from ..sensors.sentences import STATIC_INTERVAL, Station, encode, geodetic, position_report, static_reports, tag
 from ..units import DEG, DEG_PER_MIN, KNOT
+from ..world.state import EVENTS
 from .archive import Array, Episode, Floats, plain, replacing
 
 if TYPE_CHECKING:
@@ -73,8 +75,9 @@ def write_nmea(episode: Episode, path: Path) -> None:
             source, t = int(report["source"]), float(report["t"])
             utc_us = episode.meta["epoch_us"] + round(t * 1e6)
             motion = {name: float(report[name]) for name in ("cog", "heading", "sog", "rot")}
+            spoken = dataclasses.replace(stations[source], mmsi=int(report["mmsi"]))  # a spoofed station may lie about it
             messages = [
-                position_report(stations[source], float(latitude[i]), float(longitude[i]), **motion, utc_us=utc_us)
+                position_report(spoken, float(latitude[i]), float(longitude[i]), **motion, utc_us=utc_us)
             ]
             if t >= static_due[source]:
                 static_due[source] = t + STATIC_INTERVAL
@@ -160,6 +163,7 @@ def summary(episode: Episode, wall_time_s: float | None = None) -> dict[str, Any
             {"t_s": event["t"], "source": event["id"], "name": episode.name(event["id"])}
             for event in episode.events if event["kind"] == "collision"
         ],
+        "events": _events(episode),
         "objects": _objects(episode),
         "tdm": _tdm(episode),
         "ais": _ais(episode),
@@ -176,6 +180,23 @@ def write_summary(result: dict[str, Any], path: Path) -> None:
 
 def _scenario_name(scenario: Any) -> Any:
     return scenario.get("name") if isinstance(scenario, dict) else scenario
+
+
+def _events(episode: Episode) -> list[dict[str, Any]]:
+    """Events of the scenario: what, about whom, from when to when (None: to the end)."""
+    found: list[dict[str, Any]] = []
+    for event in episode.events:
+        if event["kind"] not in EVENTS:
+            continue
+        name = episode.name(event["id"]) if event["id"] >= 0 else None
+        if event["text"] == "begins":
+            found.append({"event": event["kind"], "name": name, "from_s": event["t"], "to_s": None})
+            continue
+        for begun in found:
+            if (begun["event"], begun["name"], begun["to_s"]) == (event["kind"], name, None):
+                begun["to_s"] = event["t"]
+                break
+    return found
 
 
 def _objects(episode: Episode) -> list[dict[str, Any]]:
@@ -208,8 +229,13 @@ def _objects(episode: Episode) -> list[dict[str, Any]]:
 
 
 def _tdm(episode: Episode) -> dict[str, Any]:
-    """Errors of the detected targets against the truth at the time of the report."""
+    """Errors of the detected targets against the truth at the time of the report; false targets have none."""
     d, own = episode.detections, episode.own
+    sample = np.clip(np.searchsorted(episode.t, d["t"], side="right") - 1, 0, len(episode.t) - 1)
+    there = episode.active[sample, d["source"]]
+    ever = np.asarray(episode.active.any(axis=0))
+    false_count = int((~ever[d["source"]]).sum())
+    d = d[there]
     truth, velocity, radius = np.zeros((len(d), 2)), np.zeros((len(d), 2)), np.zeros(len(d))
     for source in np.unique(d["source"]).tolist():
         rows = d["source"] == source
@@ -222,8 +248,9 @@ def _tdm(episode: Episode) -> dict[str, Any]:
     moving = d["motion_known"] & (sog >= SLOW)
     cog_error = angle_difference(d["cog"], np.arctan2(velocity[:, 1], velocity[:, 0]))[moving]
     return {
-        "reports_count": len(np.unique(d["t"])),
-        "detections_count": len(d),
+        "reports_count": len(np.unique(episode.detections["t"])),
+        "detections_count": len(episode.detections),
+        "false_detections_count": false_count,
         "position_error_by_range": [
             {
                 "range_from_m": b.from_m, "range_to_m": b.to_m, "count": b.count, "rms_m": b.rms,
@@ -290,6 +317,13 @@ def print_summary(result: dict[str, Any], console: Console | None = None) -> Non
     hits = ", ".join(f"{hit['name']} at {_text(hit['t_s'], 1)} s" for hit in result["collisions"])
     facts.add_row("collisions", escape(hits or "none"))
     out.print(facts)
+
+    if result["events"]:
+        events = table("Events", "event", "of", "from [s]", "to [s]")
+        for item in result["events"]:
+            events.add_row(item["event"].replace("_", " "), escape(item["name"] or "-"), _text(item["from_s"], 1),
+                           _text(item["to_s"], 1))  # fmt: skip
+        out.print(events)
 
     if result["objects"]:
         objects = table("Objects", "name", "closest [m]", "at [s]", "hidden from radar [s]", "AIS sent", "received")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..scenarios.events import happened
 from ..world.state import LIDAR, MODEL_3DOF, RADAR
 from .archive import AIS_REPORT, DETECTION, FAULTS, NAV, WEATHER, Array, Dtype, Episode, plain, sample_dtype
 
@@ -37,8 +38,8 @@ class _Table:
 class Recorder:
     """Record world ``b`` of a batch: call ``sample`` at the start and after every control step, then ``finish``.
 
-    States are kept at every sample, detections and AIS messages whenever the record shows a new one.  A collision
-    becomes an event by itself; everything else (waypoints, faults, notices) is told with ``event``.
+    States are kept at every sample, detections and AIS messages whenever the record shows a new one.  A collision and the
+    events of the scenario become events by themselves; everything else (waypoints, notices) is told with ``event``.
     """
 
     # views of the record, see _start
@@ -48,11 +49,13 @@ class Recorder:
     _picture_now: Array
     _sent_now: Array
     _heard_now: Array
+    _stage_now: Array
     # what was seen last
     _collided: int
     _picture: int
     _sent: Array
     _heard: Array
+    _stage: Array
 
     def __init__(self) -> None:
         """Nothing is recorded yet; the first sample decides the sizes."""
@@ -91,6 +94,8 @@ class Recorder:
             self._collided = int(self._collided_now[0])
             if self._collided >= 0:
                 self.event(self._seconds(tick), "collision", self._collided, "")
+        if (self._stage_now != self._stage).any():
+            self._happen()
         if self._picture_now[0] != self._picture:
             self._picture = int(self._picture_now[0])
             self._detect()
@@ -174,6 +179,7 @@ class Recorder:
             self._collided, self._picture = -1, 0
             self._sent = np.zeros(V + M, np.int32)
             self._heard = np.zeros(V + M, np.int32)
+            self._stage = np.zeros_like(worlds["events"]["state"][b])
             self._last_row = np.full(V + M, -1)  # of the last message of each source in the AIS table
         elif self._samples.rows.dtype != sample_dtype(V, M):
             raise ValueError("the world has other capacities than before: one Recorder records one episode")
@@ -184,6 +190,7 @@ class Recorder:
         self._picture_now = worlds["picture"]["sequence"][b]
         self._sent_now = worlds["ais"]["sequence"][b]
         self._heard_now = worlds["ais"]["received"][b, 0]
+        self._stage_now = worlds["events"]["state"][b]
         self._describe()
         self._bind()
 
@@ -240,6 +247,13 @@ class Recorder:
         return tick * self._meta["dt_us"] / 1e6
 
     # --- the tables -------------------------------------------------------------------------------------------------
+    def _happen(self) -> None:
+        """Note the events of the scenario that began or ended since the last sample."""
+        assert self._worlds is not None
+        for t, kind, source, text in happened(self._worlds[self._b], self._stage):
+            self.event(t, kind, source, text)
+        self._stage[:] = self._stage_now
+
     def _detect(self) -> None:
         """Append the targets of a new picture."""
         assert self._worlds is not None
@@ -271,6 +285,8 @@ class Recorder:
         rows["north"], rows["east"] = ais["position"][source].T
         V = len(vessels["active"])
         rows["mmsi"] = np.concatenate([vessels["mmsi"], obstacles["mmsi"]])[source]
+        lying = (ais["sent_as"][source] != 0) & (ais["spoof_mmsi"][source] != 0)
+        rows["mmsi"][lying] = ais["spoof_mmsi"][source][lying]
         rows["ais_class"] = np.concatenate([vessels["ais_class"], obstacles["ais_class"]])[source]
         # The record holds the state of now, and of traffic at its own tick; a message is younger than one sample.
         drift = obstacles["velocity"] + (obstacles["drifts"] != 0)[:, None] * w["weather"]["current"]

@@ -84,6 +84,9 @@ class Erratic(Model):
 
 
 Behaviours = KeepCourse | Waypoints | Colregs | Hostile | Erratic
+#: fields of ``pilots`` that a behaviour sets, in the order of an event's values after the code
+PARAMETERS = ("range", "period_us", "act_time", "extremis_time", "clearance", "alteration", "acceleration", "ahead", "target",
+              "wander")  # fmt: skip
 KINDS = tuple(kind for model in get_args(Behaviours) for kind in get_args(model.model_fields["kind"].annotation))
 
 
@@ -106,33 +109,41 @@ Behaviour = Annotated[
 ]
 
 
-def write_behaviour(behaviour: Behaviours, w: Any, j: int, ship_class: str, find: Callable[[str], int]) -> None:
-    """Give the ship in vessel slot j a behaviour from now on.
+class Behaving(Model):
+    """A behaviour by itself, as a command gives it."""
+
+    behaviour: Behaviour
+
+
+def as_numbers(behaviour: Behaviours, ship_class: str, find: Callable[[str], int]) -> tuple[int, dict[str, float]]:
+    """Code of a behaviour, and its fields of the record's ``pilots``; those that it does not need are 0.
 
     ``find`` gives the vessel slot of a name; ``ship_class`` decides what the options leave open.
     """
-    p, v = w["pilots"], w["vessels"]
-    for name in p.dtype.names or ():
-        p[name][j] = 0
-    p["factor"][j] = 1.0
-    p["next_tick"][j] = w["tick"]
+    numbers = dict.fromkeys(PARAMETERS, 0.0)
     if isinstance(behaviour, KeepCourse):
-        v["behaviour"][j] = state.BEHAVIOUR_HOLD
-        v["heading_set"][j] = v["eta"][j, 2]
-    elif isinstance(behaviour, Waypoints):
-        v["behaviour"][j] = state.BEHAVIOUR_WAYPOINTS
-    elif isinstance(behaviour, Colregs):
-        v["behaviour"][j] = state.BEHAVIOUR_COLREGS
+        return state.BEHAVIOUR_HOLD, numbers
+    if isinstance(behaviour, Waypoints):
+        return state.BEHAVIOUR_WAYPOINTS, numbers
+    if isinstance(behaviour, Colregs):
         for name, usual in WATCHES[ship_class]._asdict().items():
             given = getattr(behaviour, name)
-            p[name][j] = usual if given is None else given
-        p["alteration"][j] = behaviour.alteration_deg * DEG
-        p["period_us"][j] = round(behaviour.look_interval * 1e6)
-    elif isinstance(behaviour, Hostile):
-        v["behaviour"][j] = state.BEHAVIOUR_HOSTILE
-        p["range"][j], p["ahead"][j], p["target"][j] = behaviour.range, behaviour.ahead, find(behaviour.target)
-    else:
-        v["behaviour"][j] = state.BEHAVIOUR_ERRATIC
-        p["wander"][j], p["acceleration"][j] = behaviour.wander, behaviour.acceleration
-        p["alteration"][j] = behaviour.spread_deg * DEG
-        p["period_us"][j] = round(behaviour.whim_interval * 1e6)
+            numbers[name] = usual if given is None else given
+        more = {"alteration": behaviour.alteration_deg * DEG, "period_us": round(behaviour.look_interval * 1e6)}
+        return state.BEHAVIOUR_COLREGS, numbers | more
+    if isinstance(behaviour, Hostile):
+        more = {"range": behaviour.range, "ahead": behaviour.ahead, "target": find(behaviour.target)}
+        return state.BEHAVIOUR_HOSTILE, numbers | more
+    more = {"wander": behaviour.wander, "acceleration": behaviour.acceleration, "alteration": behaviour.spread_deg * DEG,
+            "period_us": round(behaviour.whim_interval * 1e6)}  # fmt: skip
+    return state.BEHAVIOUR_ERRATIC, numbers | more
+
+
+def write_behaviour(behaviour: Behaviours, w: Any, j: int, ship_class: str, find: Callable[[str], int]) -> None:
+    """Give the ship in vessel slot j a behaviour from now on."""
+    code, numbers = as_numbers(behaviour, ship_class, find)
+    p, v = w["pilots"], w["vessels"]
+    for name in p.dtype.names or ():
+        p[name][j] = numbers.get(name, 0.0)
+    p["factor"][j], p["next_tick"][j] = 1.0, w["tick"]
+    v["behaviour"][j], v["heading_set"][j] = code, v["eta"][j, 2]

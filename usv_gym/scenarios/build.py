@@ -16,7 +16,9 @@ from ..world.disturbance import set_weather
 from ..world.vessel import KinematicModel, VesselModel, load_vessel, write_kinematic, write_plant
 from . import tracks
 from .behaviours import write_behaviour
-from .schema import OWN_SHIP, GeoPoint, Preset, Scenario, Ship, Weather
+from .events import precipitation, waiting, write_events
+from .places import GeoPoint
+from .schema import OWN_SHIP, Preset, Scenario, Ship, Weather
 from .sensor_schema import Error, Lidar, Radar, Sensors
 
 Worlds: TypeAlias = np.ndarray[Any, np.dtype[Any]]
@@ -62,7 +64,7 @@ def build_worlds(
     ConfigError
         if there are more ships or obstacles than slots.
     """
-    vessels, obstacles = max(agents, 1) + len(scenario.ships), len(scenario.obstacles)
+    vessels, obstacles = max(agents, 1) + len(scenario.ships), len(scenario.obstacles) + len(scenario.phantoms())
     watching = (0,) if observers is None else tuple(observers)
     try:
         V, M = state.capacity(vessels, obstacles) if capacity is None else capacity
@@ -76,9 +78,14 @@ def build_worlds(
 
 
 def source_names(scenario: Scenario, V: int, M: int, agents: int = 0) -> Names:
-    """Names of all sources: ``own_ship`` in slot 0 (or slots for agents), then ships and obstacles in file order."""
+    """Names of all sources: ``own_ship`` in slot 0 (or slots for agents), then ships and obstacles in file order.
+
+    The last obstacle slots are those of phantoms.
+    """
     vessels = [*([""] * agents if agents else [OWN_SHIP]), *scenario.ships]
-    return [*vessels, *[""] * (V - len(vessels)), *scenario.obstacles, *[""] * (M - len(scenario.obstacles))]
+    phantoms = scenario.phantoms()
+    free = M - len(scenario.obstacles) - len(phantoms)
+    return [*vessels, *[""] * (V - len(vessels)), *scenario.obstacles, *[""] * free, *reversed(phantoms)]
 
 
 def write_world(
@@ -98,10 +105,12 @@ def write_world(
     w: Any = worlds[b]
     V, M = w["vessels"]["active"].shape[0], w["obstacles"]["active"].shape[0]
     first = max(agents, 1)
-    if first + len(scenario.ships) > V or len(scenario.obstacles) > M:
+    phantoms = len(scenario.phantoms())
+    if first + len(scenario.ships) > V or len(scenario.obstacles) + phantoms > M:
+        more = f" (with {phantoms} for false targets)" if phantoms else ""
         raise ConfigError(
-            f"scenario {scenario.name!r}: {first + len(scenario.ships)} vessels and {len(scenario.obstacles)} obstacles "
-            f"do not fit into {V} and {M} slots"
+            f"scenario {scenario.name!r}: {first + len(scenario.ships)} vessels and {len(scenario.obstacles) + phantoms} "
+            f"obstacles{more} do not fit into {V} and {M} slots"
         )
     worlds[b] = np.zeros((), worlds.dtype)
     time = scenario.simulation
@@ -113,6 +122,7 @@ def write_world(
     w["epoch_us"] = round(time.epoch.timestamp() * 1e6)
     w["area"][0] = time.area or 0.0
     w["observer"] = range(w["observer"].shape[0]) if observers is None else observers
+    w["phantoms"], w["clutter"] = phantoms, scenario.clutter
     write_weather(scenario.weather, w, scenario.preset)
     mmsis = scenario.mmsis()
     if not agents:
@@ -129,6 +139,7 @@ def write_world(
     for group, frame, now in (("vessels", "frame_eta", "eta"), ("obstacles", "frame_position", "position")):
         w[group][frame] = w[group][now]
     _write_sensors(scenario.sensors, w["sensors"])
+    _write_events(scenario, w, source_names(scenario, V, M, agents), 0 if agents else None)
     _write_nothing_yet(w)
 
 
@@ -137,8 +148,38 @@ def track_pool(scenario: Scenario) -> NDArray[np.float64]:
     return tracks.pool(ship.track for ship in scenario.ships.values() if ship.track is not None)
 
 
+def _write_events(scenario: Scenario, w: Any, names: Names, own: int | None) -> None:
+    if not scenario.events:
+        return
+    sources = {name: source for source, name in enumerate(names) if name} | ({OWN_SHIP: own} if own is not None else {})
+    V = w["vessels"]["active"].shape[0]
+    for name in waiting(scenario.events):
+        group, slot = ("vessels", sources[name]) if sources[name] < V else ("obstacles", sources[name] - V)
+        w[group]["active"][slot] = 0
+    model = load_vessel(scenario.own_ship.vessel)
+    write_events(
+        scenario.events,
+        w,
+        find=sources.__getitem__,
+        local=scenario.local,
+        thrusters=[t.name for t in model.thrusters] if isinstance(model, VesselModel) else [],
+        classes={name: ship.class_ for name, ship in scenario.ships.items()},
+    )
+
+
 def write_weather(weather: Weather, w: Any, preset: Preset) -> None:
-    """Write a weather into a record; the next reset starts it."""
+    """Write a weather into a record; the next reset starts it.
+
+    Raises
+    ------
+    ConfigError
+        if it brings false alarms and the record was built for a scenario without.
+    """
+    falls = [precipitation(kind, getattr(weather, kind)) for kind in ("rain", "fog", "snow")]
+    radar, lidar, detection = (math.prod(fall[k] for fall in falls) for k in range(3))
+    radar_clutter, lidar_clutter = (sum(fall[k] for fall in falls) for k in (3, 4))
+    if radar_clutter + lidar_clutter > 0.0 and not w["clutter"]:
+        raise ConfigError("weather: rain, fog and snow bring false alarms, which need room: write them into the scenario")
     set_weather(
         w,
         wind_speed=weather.wind.speed,
@@ -149,9 +190,11 @@ def write_weather(weather: Weather, w: Any, preset: Preset) -> None:
         wave_to=_reverse(weather.waves.from_deg),
         gusts=weather.wind.gusts,
         original=preset == "original",
-        radar_range_factor=weather.visibility.radar_range,
-        lidar_range_factor=weather.visibility.lidar_range,
-        detection_factor=weather.visibility.detection,
+        radar_range_factor=weather.visibility.radar_range * radar,
+        lidar_range_factor=weather.visibility.lidar_range * lidar,
+        detection_factor=weather.visibility.detection * detection,
+        radar_clutter=radar_clutter,
+        lidar_clutter=lidar_clutter,
     )
 
 
@@ -326,6 +369,7 @@ def _write_scanner(sensor: Radar | Lidar, p: Any, timeout_factor: float) -> None
     p["noise"] = sensor.position.noise, sensor.radius.noise
     p["bias"] = sensor.position.bias, sensor.radius.bias
     p["bias_time"] = sensor.position.bias_time or 0.0, sensor.radius.bias_time or 0.0
+    p["false_alarms"] = sensor.false_alarms
     p["detection"], p["detection_radius"] = sensor.detection, sensor.detection_radius
     p["timeout_us"] = _micros(timeout_factor * sensor.period)
 

@@ -16,11 +16,14 @@ import numpy as np
 
 from ..config import ConfigError, Document, suggestion, validate
 from ..units import DEG
-from ..world.state import BEHAVIOUR_HOLD, BEHAVIOUR_REPLAY, BEHAVIOUR_WAYPOINTS, T, W
+from ..world.state import BEHAVIOUR_HOLD, BEHAVIOUR_REPLAY, BEHAVIOUR_WAYPOINTS, KIND_BOAT, KIND_SHIP, KIND_VESSEL, T, W
+from .behaviours import Behaving, KeepCourse, write_behaviour
 from .build import Names, Worlds, write_obstacle, write_ship
+from .events import happened
 from .schema import OWN_SHIP, Obstacle, Scenario, Ship
 
 _FAR = 1 << 60  # a tick that does not come
+_CLASSES = {KIND_SHIP: "ship", KIND_VESSEL: "vessel", KIND_BOAT: "boat"}
 
 
 @dataclass(frozen=True)
@@ -28,8 +31,8 @@ class Notice:
     """Something that happened to an object."""
 
     t: float  #: [s]
-    #: spawned, removed, moved, waypoints_set, ais_on, ais_off, waypoint_reached, route_done; of replayed ships: appeared,
-    #: vanished, handed_over
+    #: spawned, removed, moved, waypoints_set, behaviour_set, course_set, speed_set, ais_on, ais_off, waypoint_reached,
+    #: route_done; of replayed ships: appeared, vanished, handed_over; or the action of an event of the scenario
     kind: str
     id: str  #: of the object
     text: str = ""
@@ -57,6 +60,7 @@ class Commands:
         self._reached = self._w["routes"]["reached"].copy()
         self._done = self._w["routes"]["done"].copy()
         self._changes = self._w["replays"]["changes"].copy()
+        self._stage = np.zeros_like(self._w["events"]["state"])
 
     # --- commands ----------------------------------------------------------------------------------------------------
     def spawn(self, id: str, spec: Mapping[str, Any]) -> int:
@@ -78,11 +82,11 @@ class Commands:
         one = validate(Scenario, document)
         V = self._w["vessels"]["active"].shape[0]
         active = self._w["vessels"]["active"] if ship else self._w["obstacles"]["active"]
-        expected = (self._w["replays"]["count"] > 0) if ship else np.zeros(len(active), bool)  # replayed ships come back
-        free = np.flatnonzero((active == 0) & ~expected)
-        if not len(free):
+        # a slot with a name waits for an event that lets it appear, or for the time of its track
+        free = [k for k in np.flatnonzero(active == 0).tolist() if not self.names[k if ship else V + k]]
+        if not free:
             raise ConfigError(f"spawn {id!r}: no free slot among {len(active)} {'vessels' if ship else 'obstacles'}")
-        slot = int(free[0])
+        slot = free[0]
         source = slot if ship else V + slot
         thing: Ship | Obstacle = one.ships[id] if ship else one.obstacles[id]
         there = (self._w["vessels"]["active"] != 0) | (self._w["replays"]["count"] > 0)
@@ -171,16 +175,42 @@ class Commands:
             self._w["ais"]["next_tick"][source] = _FAR
         self._note("ais_on" if on else "ais_off", source, "set_ais", {"id": id, "on": on})
 
+    def set_behaviour(self, id: str, behaviour: str | Mapping[str, Any]) -> None:
+        """Let a ship behave otherwise from now on: what ``ships.NAME.behaviour`` of a scenario may be."""
+        source = self._ship(id, "set_behaviour")
+        document = Document(f"set_behaviour {id!r}", {"behaviour": behaviour})
+        chosen = validate(Behaving, document).behaviour
+        write_behaviour(chosen, self._w, source, _CLASSES[int(self._w["vessels"]["kind"][source])], self._vessel)
+        plain = dict(behaviour) if isinstance(behaviour, Mapping) else behaviour
+        self._note("behaviour_set", source, "set_behaviour", {"id": id, "behaviour": plain})
+
+    def set_course(self, id: str, heading_deg: float) -> None:
+        """Let a ship leave its route and keep a heading [deg]."""
+        source = self._ship(id, "set_course")
+        _finite("set_course", id, heading_deg)
+        write_behaviour(KeepCourse(), self._w, source, "vessel", self._vessel)
+        self._w["vessels"]["heading_set"][source] = heading_deg * DEG
+        self._note("course_set", source, "set_course", {"id": id, "heading_deg": heading_deg})
+
+    def set_speed(self, id: str, speed: float) -> None:
+        """Let a ship sail at another speed [m/s]."""
+        source = self._ship(id, "set_speed")
+        _finite("set_speed", id, speed)
+        if speed < 0.0:
+            raise ConfigError(f"set_speed {id!r}: expected at least 0 m/s, got {speed:g}")
+        self._w["vessels"]["speed"][source] = speed
+        self._note("speed_set", source, "set_speed", {"id": id, "speed": speed})
+
     def apply(self, command: str, arguments: Mapping[str, Any]) -> None:
         """Give a command by name, as it stands in ``log``."""
-        known = ("spawn", "delete", "move", "set_waypoints", "set_ais")
+        known = ("spawn", "delete", "move", "set_waypoints", "set_behaviour", "set_course", "set_speed", "set_ais")
         if command not in known:
             raise ConfigError(f"unknown command {command!r}{suggestion(command, known)}")
         getattr(self, command)(**arguments)
 
     # --- notices -----------------------------------------------------------------------------------------------------
     def notices(self) -> list[Notice]:
-        """What happened since the last call, in order: commands, waypoints reached, routes done, replayed ships."""
+        """What happened since the last call, in order: commands, waypoints, replayed ships, events of the scenario."""
         route = self._w["routes"]
         for j in np.flatnonzero((route["reached"] != self._reached) | (route["done"] != self._done)).tolist():
             for k in range(int(self._reached[j]), int(route["reached"][j])):
@@ -193,8 +223,12 @@ class Commands:
             left = v["behaviour"][j] != BEHAVIOUR_REPLAY
             self._pending.append(self._notice("handed_over" if left else "appeared" if v["active"][j] else "vanished", j))
         self._changes[:] = changes
-        happened, self._pending = self._pending, []
-        return happened
+        if (self._w["events"]["state"] != self._stage).any():
+            self._pending += [Notice(t, kind, self.called[source] if source >= 0 else "", text, source)
+                              for t, kind, source, text in happened(self._w, self._stage)]  # fmt: skip
+            self._stage[:] = self._w["events"]["state"]
+        news, self._pending = self._pending, []
+        return news
 
     # --- inside ------------------------------------------------------------------------------------------------------
     @property
@@ -214,6 +248,20 @@ class Commands:
         if id == OWN_SHIP:
             raise ConfigError(f"{command} {id!r}: not possible with the own ship")
         raise ConfigError(f"{command}: unknown id {id!r}{suggestion(id, [name for name in self.names if name])}")
+
+    def _ship(self, id: str, command: str) -> int:
+        """Vessel slot of a ship that nobody controls."""
+        source = self._find(id, command)
+        if source >= self._w["vessels"]["active"].shape[0]:
+            raise ConfigError(f"{command} {id!r}: an obstacle; expected a ship")
+        return source
+
+    def _vessel(self, name: str) -> int:
+        """Vessel slot of a name that a behaviour refers to."""
+        ships = self.names[: self._w["vessels"]["active"].shape[0]]
+        if name not in ships:
+            raise ConfigError(f"set_behaviour: unknown ship {name!r}{suggestion(name, [ship for ship in ships if ship])}")
+        return ships.index(name)
 
     def _slot(self, source: int) -> tuple[Any, int]:
         V = self._w["vessels"]["active"].shape[0]

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 from ..config import ConfigError, Document, locate, read_yaml, validate
 from ..world.vessel import load_vessel
+from .events import unfit
 from .families import FAMILIES
 from .schema import DT, Preset, Scenario
 from .thesis_format import convert, kind_of, read_thesis
@@ -64,6 +65,9 @@ def load_scenario(
         scenario = validate(Scenario, document)
     if scenario.own_ship.memory and model.fluid_memory is None:
         raise ConfigError(f"{document.where(('own_ship', 'memory'))}: vessel {model.name!r} has no fluid_memory")
+    for i, event in enumerate(scenario.events):
+        if wrong := unfit(event, model):
+            raise ConfigError(f"{document.where(('events', i, wrong[0]))}: {wrong[1]}")
     _warn_of_fast_sensors(scenario, None if has_dynamics_file else Scenario())
     return scenario
 

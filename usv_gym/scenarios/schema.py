@@ -12,12 +12,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import (
-    AfterValidator,
     AwareDatetime,
     BeforeValidator,
-    Discriminator,
     Field,
-    Tag,
     ValidationInfo,
     field_validator,
     model_validator,
@@ -26,14 +23,13 @@ from pydantic import (
 from ..config import ConfigError, Model, locate, problem, suggestion
 from ..resources import shipped
 from ..units import KNOT, metres_per_degree
+from ..world.state import E
 from .behaviours import Behaviour, Hostile, Waypoints
+from .events import Event, Shower, check_targets, phantoms
 from .families import FAMILIES
+from .places import Direction, GeoPoint, Name, Origin, Position
 from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
 from .tracks import TrackError, check, nested, read_tracks
-
-Latitude = Annotated[float, Field(strict=True, ge=-90, le=90)]
-Longitude = Annotated[float, Field(strict=True, ge=-180, le=180)]
-Direction = Annotated[float, Field(strict=True, ge=-360, le=360)]
 
 Preset = Literal["standard", "original"]
 
@@ -65,46 +61,6 @@ CONSTANT_TURN_RATE_DEG = 5.0  #: [deg/s] of every ship in the original program
 def class_of_length(length: float) -> str:
     """Class of a ship that has only a length [m]: ship above 50 m, vessel above 15 m, else boat."""
     return "ship" if length > 50.0 else "vessel" if length > 15.0 else "boat"
-
-
-# --- names and places ------------------------------------------------------------------------------------------------
-def _name(value: str) -> str:
-    if not value or value != value.strip() or not value.isprintable() or set(".=") & set(value):
-        raise problem("expected a name without '.' and '=' (overrides need them) and without spaces at its ends")
-    return value
-
-
-Name = Annotated[str, AfterValidator(_name)]
-
-
-class GeoPoint(Model):
-    """A place on the globe, WGS-84."""
-
-    latitude_deg: Latitude
-    longitude_deg: Longitude
-
-
-def _kind_of_place(value: Any) -> str | None:
-    if isinstance(value, GeoPoint | Mapping):
-        return "geo"
-    return "local" if isinstance(value, list | tuple) and len(value) == 2 else None
-
-
-Position = Annotated[
-    Annotated[tuple[Number, Number], Tag("local")] | Annotated[GeoPoint, Tag("geo")],
-    Discriminator(
-        _kind_of_place,
-        custom_error_type="place",
-        custom_error_message="expected [north, east] in metres or {latitude_deg, longitude_deg}",
-    ),
-]
-
-
-class Origin(Model):
-    """Where {n} touches the earth."""
-
-    latitude_deg: Annotated[float, Field(strict=True, ge=-89, le=89)]
-    longitude_deg: Longitude
 
 
 # --- groups ----------------------------------------------------------------------------------------------------------
@@ -170,7 +126,7 @@ class Waves(Model):
 
 
 class Visibility(Model):
-    """What rain or fog does to the sensors; 1 is clear."""
+    """What the air does to the sensors, on top of rain, fog and snow; 1 is clear."""
 
     radar_range: Share = Field(default=1.0, description="share of the radar's range that is left")
     lidar_range: Share = Field(default=1.0, description="share of the LiDAR's range that is left")
@@ -178,12 +134,15 @@ class Visibility(Model):
 
 
 class Weather(Model):
-    """Wind, current, waves and visibility."""
+    """Wind, current, waves, visibility and what falls."""
 
     wind: Wind = Wind()
     current: Current = Current()
     waves: Waves = Waves()
     visibility: Visibility = Visibility()
+    rain: Share = Field(default=0.0, description="intensity; 1 is heavy")
+    fog: Share = Field(default=0.0, description="intensity; 1 is dense")
+    snow: Share = Field(default=0.0, description="intensity; 1 is a squall")
 
 
 class OwnShip(Model):
@@ -395,6 +354,7 @@ class Scenario(Model):
     sensors: Annotated[Sensors, BeforeValidator(expand_sensors, json_schema_input_type=str | SensorsInput)] = Field(
         default="thesis", validate_default=True, description="name in configs/sensors, path, or mapping with `base`"
     )
+    events: Annotated[tuple[Event, ...], Field(max_length=E)] = Field(default=(), description="what happens, and when")
 
     @model_validator(mode="after")
     def _names_and_numbers_are_unique(self) -> Self:
@@ -415,6 +375,8 @@ class Scenario(Model):
                 raise problem("the first two are the same place: no direction to start in", "ships", name, "waypoints")
             if isinstance(ship.behaviour, Hostile):
                 self._other_ship(ship.behaviour.target, name, "ships", name, "behaviour", "target")
+        tracked = {name: ship.track is not None for name, ship in self.ships.items()}
+        check_targets(self.events, tracked, list(self.obstacles))
         return self
 
     def _other_ship(self, target: str, name: str, *key: str | int) -> None:
@@ -438,6 +400,17 @@ class Scenario(Model):
         # the short way round, also across the date line
         turn = (position.longitude_deg - self.origin.longitude_deg + 180.0) % 360.0 - 180.0
         return (position.latitude_deg - self.origin.latitude_deg) * north, turn * east
+
+    @property
+    def clutter(self) -> bool:
+        """True if there may be false alarms."""
+        w, s = self.weather, self.sensors
+        rates = (w.rain, w.fog, w.snow, s.radar.false_alarms, s.lidar.false_alarms)
+        return any(rates) or any(isinstance(event, Shower) for event in self.events)
+
+    def phantoms(self) -> list[str]:
+        """Names of targets that are not there, false alarms and spoofed stations, from the last obstacle slot downwards."""
+        return phantoms(self.events, self.clutter)
 
     def mmsis(self) -> dict[str, int]:
         """MMSI of own ship, ships and obstacles by name: as given, else the next free from 257000001 and 992570001."""

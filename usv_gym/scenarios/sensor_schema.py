@@ -13,6 +13,7 @@ Number = Annotated[float, Field(strict=True)]
 Positive = Annotated[float, Field(strict=True, gt=0)]
 NonNegative = Annotated[float, Field(strict=True, ge=0)]
 Share = Annotated[float, Field(strict=True, ge=0, le=1)]
+FalseAlarms = Annotated[float, Field(strict=True, ge=0, le=2)]
 Flag = Annotated[bool, Field(strict=True)]
 
 #: largest range [m] that the Simrad Broadband 4G allows at a number of revolutions per minute (thesis 2.3.1: 32 NM at
@@ -139,6 +140,7 @@ class Scanner(Model):
     latency: NonNegative = Field(default=0.0, description="delay of every scan [s]")
     distance_gain: NonNegative = Field(default=0.01, description="k of f(d) = k d [1/m]: errors hold at d = 1 / k")
     distance_floor: Positive = Field(default=0.05, description="smallest f(d) that the tracker assumes")
+    false_alarms: FalseAlarms = Field(default=0.0, description="mean number per scan")
     detection: Share = Field(default=1.0, description="probability of detecting a large object per scan")
     detection_radius: NonNegative = Field(default=0.0, description="apparent radius [m] that halves that probability")
     position: Error = Field(default=Error(), description="per axis [m]")

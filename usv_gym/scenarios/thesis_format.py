@@ -18,7 +18,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, create_model
 
 from ..config import ConfigError, Document, KeyPath, Model, problem, read_yaml, suggestion, validate
-from .schema import MAX_WAYPOINTS, Direction, Latitude, Longitude, class_of_length
+from .places import Direction, Latitude, Longitude
+from .schema import MAX_WAYPOINTS, class_of_length
 from .sensor_schema import RADAR_REACH, NonNegative, Positive, load_sensors
 
 #: [m] straight ahead (north) of the start: the thesis's files have no route for the own ship

@@ -137,6 +137,11 @@ def transmit(w, s, tick):
         heading = cog = sog = rot = 0.0
     north += a.bias[s, 0] + p.ais_noise[0] * n0
     east += a.bias[s, 1] + p.ais_noise[1] * n1
+    a.sent_as[s] = a.spoof_source[s]
+    if a.spoof_source[s]:
+        lying = (tick - a.spoof_tick[s]) * w.dt
+        north += a.spoof_offset[s, 0] + a.spoof_rate[s, 0] * lying
+        east += a.spoof_offset[s, 1] + a.spoof_rate[s, 1] * lying
     cog = wrap_positive(cog + a.bias[s, 2] + p.ais_noise[2] * n2)
     heading = wrap_positive(heading + a.bias[s, 3] + p.ais_noise[3] * n3)
     sog = max(sog + a.bias[s, 4] + p.ais_noise[4] * n4, 0.0)

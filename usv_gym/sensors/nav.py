@@ -50,8 +50,9 @@ def navigate(w, tick):
                 heading_error, _ = _noise2(w, rng.GNSS, o * 3 + 1, tick, p.gnss_noise[1])
                 course_error, _ = _noise2(w, rng.GNSS, o * 3 + 2, tick, p.gnss_noise[2])
                 speed_error, _ = _noise2(w, rng.GNSS_SPEED, o, tick, p.gnss_noise[3])
-                nav.position[o, 0] = v.eta[j, 0] + p.gnss_drift[0] + n0
-                nav.position[o, 1] = v.eta[j, 1] + p.gnss_drift[1] + n1
+                drifting = (tick - p.gnss_drift_tick) * w.dt
+                nav.position[o, 0] = v.eta[j, 0] + (p.gnss_drift[0] + p.gnss_drift_rate[0] * drifting) + n0
+                nav.position[o, 1] = v.eta[j, 1] + (p.gnss_drift[1] + p.gnss_drift_rate[1] * drifting) + n1
                 sog = math.hypot(v.velocity[j, 0], v.velocity[j, 1])
                 nav.heading[o] = wrap_positive(psi + heading_error)
                 course = atan2(v.velocity[j, 1], v.velocity[j, 0]) if sog > 1.0e-9 else psi

@@ -13,6 +13,7 @@ import math
 from .. import rng
 from ..jit import inner, spliced
 from ..world.state import LIDAR, RADAR
+from .clutter import false_alarms
 from .noise import pair_slot
 from .shadow import apparent_half_width, cast_shadows, look_around
 from .tdm import take_scan
@@ -41,7 +42,8 @@ def _decay(bias, bias_time, seconds):
 
 
 @inner
-def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection):
+def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection,
+          clutter, stream_clutter):
     t = w.tracks
     own = w.observer[o]
     S = t.id.shape[1]
@@ -101,6 +103,8 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
         # the controller's side knows the measured range only
         t.measured[o, k, s, 3] = max(sensor.gain * math.hypot(dn, de), sensor.gain_floor)
         t.measured_us[o, k, s] = now
+    if w.clutter:
+        false_alarms(w, o, k, sensor, reach, clutter, tick, stream_clutter)
     t.scan_us[o, k] = now
     t.scan_due[o, k] = tick + sensor.latency_us // w.dt_us
 
@@ -110,7 +114,8 @@ def scan_radar(w, land, o, tick):
     """One revolution of the radar of observer o."""
     p = w.sensors.radar
     _scan(w, land, o, RADAR - 1, p, p.range * w.weather.radar_range_factor, tick,
-          rng.RADAR_BIAS, rng.RADAR_NOISE, rng.RADAR_DETECTION)  # fmt: skip
+          rng.RADAR_BIAS, rng.RADAR_NOISE, rng.RADAR_DETECTION,
+          p.false_alarms + w.weather.radar_clutter, rng.RADAR_CLUTTER)  # fmt: skip
 
 
 @inner
@@ -118,4 +123,5 @@ def scan_lidar(w, land, o, tick):
     """One sweep of the LiDAR of observer o."""
     p = w.sensors.lidar
     _scan(w, land, o, LIDAR - 1, p, p.range * w.weather.lidar_range_factor, tick,
-          rng.LIDAR_BIAS, rng.LIDAR_NOISE, rng.LIDAR_DETECTION)  # fmt: skip
+          rng.LIDAR_BIAS, rng.LIDAR_NOISE, rng.LIDAR_DETECTION,
+          p.false_alarms + w.weather.lidar_clutter, rng.LIDAR_CLUTTER)  # fmt: skip

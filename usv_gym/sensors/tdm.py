@@ -86,17 +86,26 @@ def _appear(w, o, s):
 
 
 @inner
-def take_ais(w, o, s):
-    """An AIS message of source s arrives at observer o: into the inbox and into the AIS filter."""
+def take_ais(w, o, sender):
+    """An AIS message of a source arrives at observer o: into the inbox and into the AIS filter.
+
+    One of a spoofed station is that of another target.  Under the sender's own MMSI that one takes the sender's place.
+    """
     a, t = w.ais, w.tracks
-    stamp = a.stamp_us[s]
+    s = sender
+    if a.sent_as[sender]:
+        s = a.sent_as[sender]
+        if a.spoof_mmsi[sender] == 0:
+            a.inbox_stamp_us[o, sender] = -1
+            t.phase[o, sender, AIS] = PHASE_NONE
+    stamp = a.stamp_us[sender]
     box = a.inbox[o, s]
-    box[0] = a.position[s, 0]
-    box[1] = a.position[s, 1]
-    box[2] = a.cog[s]
-    box[3] = a.heading[s]
-    box[4] = a.sog[s]
-    box[5] = a.rot[s]
+    box[0] = a.position[sender, 0]
+    box[1] = a.position[sender, 1]
+    box[2] = a.cog[sender]
+    box[3] = a.heading[sender]
+    box[4] = a.sog[sender]
+    box[5] = a.rot[sender]
     a.inbox_stamp_us[o, s] = stamp
     phase = t.phase[o, s, AIS]
     elapsed = stamp - t.stamp_us[o, s, AIS]

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 
 from ..jit import inner
+from ..sensors.ais import ais_class
 from ..trig import PI, TWO_PI, atan2, clip, sincos, wrap
-from ..world.state import DESCRIPTOR_VESSEL
+from ..world.state import AIS_ATON, DESCRIPTOR_VESSEL
 from .task import N_OWN, N_TARGET, OBS_AIS, OBS_SECTORS, OBS_TRACKS, OBS_TRUTH
 
 
@@ -170,7 +171,8 @@ def observe(w, land, o, task, obs):
                 ts, tc = sincos(box[2])
                 vn, ve = box[4] * tc, box[4] * ts
             age = (w.tick * w.dt_us - w.ais.inbox_stamp_us[o, s]) * 1.0e-6
-            _target(task, out, box[0] - north, box[1] - east, vn, ve, hs, hc, known, 0.0, age / 60.0, s < V)
+            _target(task, out, box[0] - north, box[1] - east, vn, ve, hs, hc, known, 0.0, age / 60.0,
+                    ais_class(w, s) != AIS_ATON)  # fmt: skip
         elif s < V:
             _target(task, out, w.vessels.eta[s, 0] - north, w.vessels.eta[s, 1] - east, w.vessels.velocity[s, 0],
                     w.vessels.velocity[s, 1], hs, hc, True, 0.5 * max(w.vessels.length[s], w.vessels.beam[s]), 0.0,

@@ -30,12 +30,13 @@ def actuate(w, p, h):
         demand = clip(q.command[p, i, 0], -1.0, 1.0)
         idle = q.n_idle[p, i]
         span = q.n_max[p, i] - idle if demand >= 0.0 else idle - q.n_min[p, i]
-        q.n[p, i] += q.lag[p, i, 0] * (idle + demand * span - q.n[p, i])
+        if q.jet_stuck[p, i] == 0:
+            q.n[p, i] += q.lag[p, i, 0] * (idle + demand * span - q.n[p, i])
         if q.nozzle_stuck[p, i] == 0:
             # a nozzle that points to port pushes the stern to port and the bow to starboard
             alpha = -q.nozzle_max[p, i] * clip(q.command[p, i, 1], -1.0, 1.0)
             q.alpha[p, i] += q.lag[p, i, 1] * (alpha - q.alpha[p, i])
-        if q.bucket[p, i] != 0:
+        if q.bucket[p, i] != 0 and q.jet_stuck[p, i] == 0:
             q.beta[p, i] += q.lag[p, i, 2] * (clip(q.command[p, i, 2], -1.0, 1.0) - q.beta[p, i])
 
 

@@ -222,6 +222,8 @@ def set_weather(
     radar_range_factor: float = 1.0,
     lidar_range_factor: float = 1.0,
     detection_factor: float = 1.0,
+    radar_clutter: float = 0.0,
+    lidar_clutter: float = 0.0,
 ) -> None:
     """Fill the weather group of one record, ``worlds[b]``, from physical numbers; ``weather_reset`` then starts it.
 
@@ -241,8 +243,11 @@ def set_weather(
         the recipes and constants of the simulator of 2017.
     radar_range_factor, lidar_range_factor, detection_factor
         what this weather does to the sensors, 1 = nothing.
+    radar_clutter, lidar_clutter
+        false alarms that it adds, per scan.
     """
     weather: Any = world["weather"]
+    weather["radar_clutter"], weather["lidar_clutter"] = radar_clutter, lidar_clutter
     weather["wind_u10"], weather["current"] = 0.0, 0.0  # written by weather_reset, and by weather_step if on
     weather["on"] = wind_speed > 0.0 or current_speed > 0.0 or wave_height > 0.0
     weather["original"] = original

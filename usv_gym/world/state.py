@@ -44,6 +44,17 @@ AFTER_STOP, AFTER_CONTINUE, AFTER_LOOP = 0, 1, 2
 AIS_NONE, AIS_CLASS_A, AIS_CLASS_B, AIS_ATON = 0, 1, 2, 3
 AIS, RADAR, LIDAR = 0, 1, 2  #: sensors of the TDM, in the order of every ``[.., 3]`` axis
 PHASE_NONE, PHASE_POSITION, PHASE_MOTION = 0, 1, 2  #: what a local filter knows
+TRIGGER_NONE, TRIGGER_TIME, TRIGGER_DISTANCE, TRIGGER_TCPA = 0, 1, 2, 3
+#: actions of events, in the order of their codes; those that write the same fields stand together (usv_gym/events.py)
+EVENTS = (
+    "ais_silent", "ais_spoofed", "ais_jammed", "gnss_frozen", "gnss_drifting", "radar_outage", "lidar_outage",
+    "rain", "fog", "snow", "jet_stuck", "nozzle_stuck", "reduced_thrust", "change_course", "change_speed",
+    "change_behaviour", "spawn", "delete",
+)  # fmt: skip
+EVENT_AIS_SILENT, EVENT_AIS_SPOOFED, EVENT_AIS_JAMMED, EVENT_GNSS_FROZEN, EVENT_GNSS_DRIFTING = 0, 1, 2, 3, 4
+EVENT_RADAR_OUTAGE, EVENT_LIDAR_OUTAGE, EVENT_RAIN, EVENT_FOG, EVENT_SNOW = 5, 6, 7, 8, 9
+EVENT_JET_STUCK, EVENT_NOZZLE_STUCK, EVENT_REDUCED_THRUST = 10, 11, 12
+EVENT_CHANGE_COURSE, EVENT_CHANGE_SPEED, EVENT_CHANGE_BEHAVIOUR, EVENT_SPAWN, EVENT_DELETE = 13, 14, 15, 16, 17
 DESCRIPTOR_FIXED, DESCRIPTOR_VESSEL, DESCRIPTOR_LAND = 0, 1, 2
 
 NX_AIS, NX_SCAN = 12, 9  #: states of the AIS filter and of a radar or LiDAR filter (sensors/tracker.py)
@@ -189,10 +200,11 @@ def _events(E: int) -> Dtype:
     """What happens in a scenario, and when (usv_gym/events.py)."""
     return np.dtype([
         ("trigger", i1, (E,)), ("threshold", f8, (E,)),  # TRIGGER_*; s, m or s
-        ("subject", i4, (E,)), ("point", f8, (E, 2)),  # source whose distance or TCPA counts; N, E [m] {n}, NaN: the own ship
+        # source whose distance or TCPA counts, from a point N, E [m] {n} (NaN: from the own ship)
+        ("subject", i4, (E,)), ("point", f8, (E, 2)),
         ("duration", f8, (E,)),  # [s]; inf: for good
         ("action", i1, (E,)), ("target", i4, (E,)),  # EVENT_*; source, or thruster (-1: all)
-        ("value", f8, (E, 6)), ("saved", f8, (E, 6)),  # how much; what was before
+        ("value", f8, (E, 13)), ("saved", f8, (E, 13)),  # how much; what was before
         ("state", i1, (E,)),  # 0 to come, 1 under way, 2 over
         ("began", i8, (E,)), ("ended", i8, (E,)),  # ticks
     ], align=True)  # fmt: skip
@@ -286,7 +298,7 @@ def _ais(O: int, S: int) -> Dtype:
         # fault: what a station says is off by an offset [m] {n} that grows at a rate [m/s] since a tick, under this MMSI
         # (0: its own), and makes a target of its own in this slot (0: no fault)
         ("spoof_offset", f8, (S, 2)), ("spoof_rate", f8, (S, 2)), ("spoof_tick", i8, (S,)), ("spoof_mmsi", i8, (S,)),
-        ("spoof_source", i4, (S,)),
+        ("spoof_source", i4, (S,)), ("sent_as", i4, (S,)),  # sent_as: the same of the last message
         ("received", i4, (O, S)),  # sequence number of the last message that got through
         ("due_tick", i8, (O, S)),  # when that message arrives; -1: nothing on its way
         # the last message that arrived: N, E [m], COG, heading [rad], SOG [m/s], ROT [rad/s]; stamp -1: none yet
