@@ -274,7 +274,7 @@ def _route(places: Floats) -> list[list[float]]:
         across = np.abs(leg[0] * rel[:, 1] - leg[1] * rel[:, 0]) / length if length > 1.0 else np.hypot(*rel.T)
         return np.asarray(across / tolerance)
 
-    tolerance = 10.0
+    tolerance = 25.0  # a sailing yacht wanders that much
     while True:
         route: list[Floats] = []
         for place in places[split_where_worst(len(places), off)][1:]:
