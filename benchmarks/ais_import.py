@@ -4,7 +4,7 @@
 
 The table is synthetic, in the columns of the Danish Maritime Authority: 2000 ships on straight courses, a report every ten
 seconds.  The import takes those within 20 km for two hours, in a process of its own whose peak of memory is read.  The replay
-runs through the kernel, second by second, for all ships of both recordings of real traffic.  Writes ``results/ais_import.json``.
+runs through the kernel, second by second, for all ships of both recordings of real traffic.  Writes results/ais_import.json.
 """
 
 from __future__ import annotations

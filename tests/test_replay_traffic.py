@@ -107,6 +107,16 @@ def test_a_ship_near_the_own_ship_is_left_to_its_behaviour_for_good(handover):
     assert v["eta"][0, 1, :2] == pytest.approx([2000.0 - 5.0 * 700.0, 0.0], abs=3.0)
 
 
+def test_a_ship_at_rest_stays_with_its_data_until_it_casts_off():
+    moored = [[0, 50, 0, 0, 0, 90], [100, 50, 0, 0, 0, 90], [150, 100, 0, 0, 2, 0], [400, 600, 0, 0, 2, 0]]
+    worlds, _, tracks, _ = sea(moored, own=(0.0, 0.0), handover={"distance": 500.0})
+    sail(worlds, tracks, 90.0)
+    assert worlds["vessels"]["behaviour"][0, 1] == BEHAVIOUR_REPLAY
+    assert worlds["vessels"]["eta"][0, 1] == pytest.approx([50.0, 0.0, math.pi / 2], abs=1e-6)
+    sail(worlds, tracks, 60.0)
+    assert worlds["vessels"]["behaviour"][0, 1] != BEHAVIOUR_REPLAY
+
+
 @pytest.mark.parametrize("behaviour", ["waypoints", "colregs"])
 def test_what_is_left_of_a_track_is_the_route_of_a_ship_that_was_handed_over(behaviour):
     corner = [[0, 2000, 500, 180, 5, 180], [400, 0, 500, 180, 5, 180], [600, -500, 0, 225, 5, 225]]

@@ -23,7 +23,7 @@ from ..world.state import AFTER_CONTINUE, BEHAVIOUR_REPLAY, KNOT_FIELDS, W
 T_US, NORTH, EAST, V_NORTH, V_EAST, HEADING, SEEN = range(7)
 NO_TRACKS = np.zeros((0, KNOT_FIELDS))  #: the pool of worlds without replayed ships
 
-_MAKES_WAY = 0.25  #: [m/s] below which a ship has no course to keep
+_MAKES_WAY = 0.25  #: [m/s] below which a ship has no course to keep, and no way to give
 _REACH = 50.0  #: [m] least distance between the waypoints of a ship that was handed over
 _ON = 20_000.0  #: [m] how far ahead lies its last waypoint
 
@@ -94,7 +94,7 @@ def replay(w, tracks, seconds):
         v.nu[j, 0] = vn * c + ve * s
         v.nu[j, 1] = ve * c - vn * s
         v.nu[j, 2] = turn / seconds
-        if r.hands_over[j] and _own_ship_near(w, j):
+        if r.hands_over[j] and math.hypot(vn, ve) > _MAKES_WAY and _own_ship_near(w, j):
             _hand_over(w, tracks, j, k)
 
 
@@ -151,9 +151,8 @@ def _hand_over(w, tracks, j, k):
     v, r, route = w.vessels, w.replays, w.routes
     v.behaviour[j] = r.then[j]
     r.changes[j] += 1
-    speed = math.hypot(v.velocity[j, 0], v.velocity[j, 1])
-    course = atan2(v.velocity[j, 1], v.velocity[j, 0]) if speed > _MAKES_WAY else v.eta[j, 2]
-    v.speed[j] = speed if speed > _MAKES_WAY else 0.0
+    v.speed[j] = math.hypot(v.velocity[j, 0], v.velocity[j, 1])
+    course = atan2(v.velocity[j, 1], v.velocity[j, 0])
     v.heading_set[j] = course
     left = 0
     while tracks[k + left, SEEN] != 0.0:  # the last knot of a track is never seen to a next one
