@@ -14,11 +14,10 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
 from usv_gym.config import ConfigError
-from usv_gym.envs import ENVIRONMENTS
 from usv_gym.envs.threads import Crew
 from usv_gym.envs.vector import USVVectorEnv
 
-OPEN_SEA, SCENARIO = ENVIRONMENTS
+OPEN_SEA, SCENARIO = "usv_gym/OpenSea-v0", "usv_gym/Scenario-v0"
 SHORT = ["simulation.duration=12"]  # many autoresets in few steps
 KINDS = [
     (OPEN_SEA, {}),

@@ -157,6 +157,6 @@ class Voyage:
             vessel=core.model.name,
             control_interval=core.control_interval,
             outcome={"outcome": self.outcome or "interrupted", "closest_m": float(core.episodes["closest"][0])},
-            task=self.config.dump(),
+            task=core.config.dump(),
             orders=[[tick, command, arguments] for tick, command, arguments in self.commands.log],
         )

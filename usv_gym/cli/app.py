@@ -32,6 +32,19 @@ def one_or_all(scenario: list[str]) -> str | list[str]:
     return scenario[0] if len(scenario) == 1 else scenario
 
 
+def pixels(size: str) -> tuple[int, int]:
+    """Width and height of ``WIDTHxHEIGHT``; ConfigError for anything else."""
+    from ..config import ConfigError
+
+    try:
+        width, height = (int(part) for part in size.lower().split("x"))
+        if not 1 <= min(width, height) <= max(width, height) <= 8192:
+            raise ValueError
+    except ValueError:
+        raise ConfigError(f"--size {size}: expected WIDTHxHEIGHT in pixels, as 1180x800") from None
+    return width, height
+
+
 def complain(error: BaseException) -> None:
     """One line on stderr for every line of an error."""
     for line in str(error).splitlines():

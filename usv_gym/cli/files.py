@@ -28,7 +28,7 @@ def validate(
             complain(error)
         else:
             typer.echo(f"{file}: ok: {len(scenario.ships)} ships, {len(scenario.obstacles)} obstacles, "
-                       f"vessel {scenario.own_ship.vessel}")  # fmt: skip
+                       f"vessel {scenario.own_ship.vessel_name}")  # fmt: skip
     if wrong:
         raise typer.Exit(2)
 

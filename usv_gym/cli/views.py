@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .app import Archive, Palette, Scenarios, Seed, Set, Trust, Vessel, app, one_or_all
+from .app import Archive, Palette, Scenarios, Seed, Set, Trust, Vessel, app, one_or_all, pixels
 
 
 @app.command()
@@ -72,12 +72,7 @@ def render(
     from ..render.palette import PALETTES
     from ..replay.archive import open_archive
 
-    try:
-        width, height = (int(part) for part in size.lower().split("x"))
-        if not 1 <= min(width, height) <= max(width, height) <= 8192:
-            raise ValueError
-    except ValueError:
-        raise ConfigError(f"--size {size}: expected WIDTHxHEIGHT in pixels, as 1180x800") from None
+    width, height = pixels(size)
     if palette not in PALETTES:
         raise ConfigError(f"--palette {palette}: expected one of {', '.join(PALETTES)}")
     episode = open_archive(archive)

@@ -104,7 +104,7 @@ class Core:
         num_threads: int = 1,
     ) -> None:
         self.num = num
-        self.config = config
+        self.config = self._asked = config
         self.overrides = tuple(overrides)
         self.weather = [check_weather(weather)] * num  # [B]
         self.max_steps = max_steps
@@ -140,8 +140,8 @@ class Core:
         scenario = load_scenario(source, overrides=self.overrides, vessel=vessel)
         model = load_vessel(scenario.own_ship.vessel)
         facts = vessel_facts(model)
-        self.config = self.config.model_copy(update={"action": resolve_action(self.config, facts)})
-        space = action_space(self.config, facts)
+        config = self._asked.scaled(scenario.scale).model_copy(update={"action": resolve_action(self._asked, facts)})
+        space = action_space(config, facts)
         if space != getattr(self, "action_space", space):
             raise ConfigError(
                 f"vessel {model.name!r} has another action space; make the environment with vessel={model.name!r}, "
@@ -155,7 +155,7 @@ class Core:
         worlds, names = build_worlds(scenario, self.num, capacity=slots)
         # nothing is changed until all of it is known to be right
         self.source, self.vessel, self.scenario, self.model, self._family = source, vessel, scenario, model, family
-        self.worlds, self.names, self.action_space = worlds, names, space
+        self.worlds, self.names, self.action_space, self.config = worlds, names, space, config
         self.land = NO_LAND
         self.tracks = track_pool(scenario)
         self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
@@ -212,6 +212,12 @@ class Core:
     # --- running -----------------------------------------------------------------------------------------------------
     def reset(self, mask: NDArray[np.bool_], generators: Sequence[np.random.Generator]) -> None:
         """Draw and start new episodes in the rows of ``mask`` [B]; generators [B] own the randomness."""
+        self.draw(mask, generators)
+        self._what[:] = np.where(mask, BEGIN, 0)
+        self._run(NO_ROWS)
+
+    def draw(self, mask: NDArray[np.bool_], generators: Sequence[np.random.Generator]) -> None:
+        """The first half of ``reset``: write the rows of ``mask`` anew, as they stand before anything has fired."""
         rows = self._bytes
         for b in np.flatnonzero(mask).tolist():
             rows[b] = self._template
@@ -219,8 +225,6 @@ class Core:
             self._set_weather(b, generators[b])
         if self._family is not None:
             self._family.sample(self.worlds, mask, self.difficulty, self.model, self.scenario)
-        self._what[:] = np.where(mask, BEGIN, 0)
-        self._run(NO_ROWS)
 
     def _set_weather(self, b: int, generator: np.random.Generator) -> None:
         """Overwrite the weather of row b where the caller or the family asks for it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scenarios.commands import Commands
-from ..scenarios.loader import Source
+from ..scenarios.family_schema import Family
+from ..scenarios.loader import Source, load_scenario
 from ..tasks.task import task_config, unflatten
 from .core import Core
 from .notice import compiling
@@ -20,10 +22,22 @@ from .notice import compiling
 _ONE = np.ones(1, np.bool_)
 
 
-def refuse_scenario(arguments: Mapping[str, Any]) -> None:
-    """ValueError where ``scenario=`` is given to an id that draws its own sea."""
+def with_family(sea: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of an id that draws its own sea, with the keys of its family (``case=5``) as overrides of the scenario.
+
+    Raises
+    ------
+    ValueError
+        where ``scenario=`` is given.
+    """
     if "scenario" in arguments:
         raise ValueError("this environment draws its own sea; use usv_gym/Scenario-v0 for scenario=")
+    family = load_scenario(sea).family
+    known = type(family).model_fields.keys() - Family.model_fields.keys() if family else ()
+    own = [key for key in arguments if key in known]
+    rest = {key: value for key, value in arguments.items() if key not in own}
+    said = [f"family.{key}={json.dumps(arguments[key])}" for key in own]
+    return {**rest, "overrides": [*rest.get("overrides", ()), *said]} if said else rest
 
 
 class USVEnv(gym.Env[Any, Any]):
@@ -221,8 +235,7 @@ class FamilyEnv(USVEnv):
     __doc__ = USVEnv.__doc__
 
     def __init__(self, sea: str, **kwargs: Any) -> None:
-        refuse_scenario(kwargs)
-        super().__init__(sea, **kwargs)
+        super().__init__(sea, **with_family(sea, kwargs))
 
 
 class ScenarioEnv(USVEnv):

@@ -17,7 +17,7 @@ from ..scenarios.loader import Source
 from ..tasks.task import task_config, unflatten
 from .core import Core, check_difficulty, check_weather, masked
 from .notice import compiling
-from .single import USVEnv, refuse_scenario
+from .single import USVEnv, with_family
 
 Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
@@ -330,8 +330,7 @@ class FamilyVectorEnv(USVVectorEnv):
     """An id with a sea of its own, ``num_envs`` times: a new sea at every reset of a row."""
 
     def __init__(self, num_envs: int = 1, *, sea: str, **kwargs: Any) -> None:
-        refuse_scenario(kwargs)
-        super().__init__(num_envs, sea, **kwargs)
+        super().__init__(num_envs, sea, **with_family(sea, kwargs))
 
 
 class ScenarioVectorEnv(USVVectorEnv):

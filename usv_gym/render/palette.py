@@ -61,6 +61,7 @@ STYLES: dict[str, Style] = {
     # tracks and route
     "track_own":      _style("- #7a1fa8",         "- #cf8cff",         "- #b3684f", 2.0),
     "track_ship":     _style("- #2f9462",         "- #41c384",         "- #6f5a22", 1.3),
+    "track_later":    _style("- #2f946270",       "- #41c38470",       "- #6f5a2280", 1.1, (2, 5)),
     "tick_own":       _style("#7a1fa8 -",         "#cf8cff -",         "#b3684f -"),
     "tick_ship":      _style("#2f9462 -",         "#41c384 -",         "#6f5a22 -"),
     "label_lidar":    _style("#d7ebf0 #0f6f6b",   "#0a0d10 #45c0b9",   "#070504 #8f7a30"),

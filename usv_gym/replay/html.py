@@ -204,7 +204,7 @@ def _thrusters(meta: Mapping[str, Any]) -> list[Any]:
     scenario = meta.get("scenario")
     own = scenario.get("own_ship", {}) if isinstance(scenario, Mapping) else {}
     for name in (own.get("vessel"), meta.get("vessel")):
-        if name:
+        if isinstance(name, str) and name:
             try:
                 return list(load_vessel(name).thrusters)
             except (ConfigError, OSError):

@@ -11,7 +11,6 @@ from typing import Any, TypeAlias
 from ..config import ConfigError, Document, locate, read_yaml, validate
 from ..world.vessel import load_vessel
 from .events import unfit
-from .families import FAMILIES
 from .schema import DT, Preset, Scenario
 from .thesis_format import convert, kind_of, read_thesis
 
@@ -30,8 +29,9 @@ def load_scenario(
     Parameters
     ----------
     source
-        a name that ships in ``configs/scenarios``; the path of a native YAML file; the thesis's own files, as a
-        directory or as paths in any order; a mapping with the native keys; or a scenario, to override.
+        a name that ships in ``configs/scenarios``; the path of a native YAML file, or of a DNV traffic situation (.json);
+        the thesis's own files, as a directory or as paths in any order; a mapping with the native keys; or a scenario, to
+        override.
     overrides
         ``key.path=value`` each, in native keys, with the value as in YAML: ``"ships.ferry.waypoints.0=[100, 0]"``.
     vessel, preset
@@ -58,8 +58,10 @@ def load_scenario(
     if scenario.family is not None:
         # what the family would choose, where the file does not
         if "duration" not in document.data.get("simulation", {}):
-            seconds = float(math.ceil(FAMILIES[scenario.family.name].reach / model.cruise_speed))
+            seconds = float(math.ceil(scenario.family.duration(model)))
             document = document.replaced(("simulation", "duration"), seconds, "family")
+        if "scale" not in document.data:
+            document = document.replaced(("scale",), scenario.family.scale(model), "family")
         if "weather" in document.data and "weather" not in document.data["family"]:
             document = document.replaced(("family", "weather"), "scenario", "family")
         scenario = validate(Scenario, document)
@@ -77,7 +79,7 @@ def _document(source: Source) -> tuple[Document, bool]:
     if isinstance(source, Scenario):
         return Document(source.name or "scenario", source.dump()), False
     if isinstance(source, Mapping):
-        return Document("scenario", dict(source)), False
+        return _on_base(Document("scenario", dict(source))), False
     if not isinstance(source, str | Path):
         paths = list(source)
         if not paths:
@@ -85,6 +87,10 @@ def _document(source: Source) -> tuple[Document, bool]:
         return _document(paths[0]) if len(paths) == 1 else _converted(read_thesis(paths))
     if Path(source).is_dir():
         return _converted(read_thesis([source]))
+    if Path(source).suffix == ".json":
+        from .dnv import read_situation
+
+        return read_situation(source), False
     is_file = Path(source).suffix in (".yaml", ".yml") or Path(source).is_file()
     path = Path(source) if is_file else locate("scenarios", str(source))
     document = read_yaml(path)
@@ -92,7 +98,33 @@ def _document(source: Source) -> tuple[Document, bool]:
         return _converted(convert([document], name=str(path)))
     if not document.data.get("name"):
         document.data["name"] = path.stem
-    return document, False
+    return _on_base(document), False
+
+
+def _on_base(document: Document, above: tuple[str, ...] = ()) -> Document:
+    """A document with what it does not say from its ``base``, and from the base of that."""
+    name = document.data.get("base")
+    if name is None:
+        return document
+    if not isinstance(name, str):
+        raise ConfigError(f"{document.where(('base',))}: expected the name or path of a scenario, got {name!r}")
+    try:
+        path = locate("scenarios", name, document.directory)
+    except ConfigError as error:
+        raise ConfigError(f"{document.where(('base',))}: {error}") from None
+    if str(path) in above:
+        raise ConfigError(f"{document.where(('base',))}: a scenario cannot be its own base")
+    below = _names_as_mappings(_on_base(read_yaml(path), (*above, str(path))))
+    ours = _names_as_mappings(document) if "sensors" in document.data else document
+    rest = {key: value for key, value in ours.data.items() if key != "base"}
+    return Document(document.name, _merged(below.data, rest), {**below.origins, **document.origins}, document.directory)
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Two mappings as one: what is above wins, mappings in both are merged in turn."""
+    both = {key: _merged(below[key], value) if isinstance(value, Mapping) and isinstance(below.get(key), Mapping) else value
+            for key, value in above.items()}  # fmt: skip
+    return {**below, **both}
 
 
 def _converted(document: Document) -> tuple[Document, bool]:

@@ -14,7 +14,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 from pydantic import (
     AwareDatetime,
     BeforeValidator,
+    Discriminator,
     Field,
+    Tag,
     ValidationInfo,
     field_validator,
     model_validator,
@@ -24,9 +26,10 @@ from ..config import ConfigError, Model, locate, problem, suggestion
 from ..resources import shipped
 from ..units import KNOT, metres_per_degree
 from ..world.state import E
+from ..world.vessel import KinematicModel
 from .behaviours import Behaviour, Hostile, Waypoints
 from .events import Event, Shower, check_targets, phantoms
-from .families import FAMILIES
+from .family_schema import AnyFamily
 from .places import Direction, GeoPoint, Name, Origin, Position
 from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
 from .tracks import TrackError, check, nested, read_tracks
@@ -145,10 +148,28 @@ class Weather(Model):
     snow: Share = Field(default=0.0, description="intensity; 1 is a squall")
 
 
+def _kind_of_vessel(value: Any) -> str | None:
+    if isinstance(value, KinematicModel | Mapping):
+        return "kinematic"
+    return "name" if isinstance(value, str) else None
+
+
+VesselSource = Annotated[
+    Annotated[str, Tag("name")] | Annotated[KinematicModel, Tag("kinematic")],
+    Discriminator(
+        _kind_of_vessel,
+        custom_error_type="vessel",
+        custom_error_message="expected the name or path of a vessel, or a kinematic vessel in full",
+    ),
+]
+
+
 class OwnShip(Model):
     """The USV: which vessel, where it starts, where it is going."""
 
-    vessel: str = Field(default="odin", description="name in configs/vessels, or path of a YAML file")
+    vessel: VesselSource = Field(
+        default="odin", description="name in configs/vessels, path of a YAML file, or a kinematic vessel in full"
+    )
     position: Position = (0.0, 0.0)
     heading_deg: Direction = 0.0
     speed: Number = Field(default=0.0, description="ahead, over ground [m/s]")
@@ -162,13 +183,20 @@ class OwnShip(Model):
 
     @field_validator("vessel")
     @classmethod
-    def _vessel_exists(cls, value: str, info: ValidationInfo) -> str:
+    def _vessel_exists(cls, value: str | KinematicModel, info: ValidationInfo) -> str | KinematicModel:
+        if isinstance(value, KinematicModel):
+            return value
         try:
             path = locate("vessels", value, (info.context or {}).get("directory"))
         except ConfigError as error:
             raise problem(str(error)) from None
         # a path that was relative to the file must still hold where the scenario is used or dumped to
         return value if value in shipped("vessels") else str(path.resolve())
+
+    @property
+    def vessel_name(self) -> str:
+        """What the vessel is called."""
+        return self.vessel if isinstance(self.vessel, str) else self.vessel.name
 
 
 def _by_class(what: str) -> Callable[[dict[str, Any]], Any]:
@@ -294,28 +322,6 @@ class Obstacle(Model):
     mmsi: Annotated[int, Field(strict=True, ge=992_000_000, le=997_999_999)] | None = None
 
 
-# --- families --------------------------------------------------------------------------------------------------------
-def _family_by_name(value: Any) -> Any:
-    return {"name": value} if isinstance(value, str) else value
-
-
-class Family(Model):
-    """What is drawn anew at every reset, on top of the rest of the scenario."""
-
-    name: str
-    difficulty: Share = Field(default=0.5, description="0 to 1: how much there is, and how near it comes")
-    weather: Literal["random", "scenario"] = Field(
-        default="random", description="drawn by difficulty, or that of the scenario (the rule where one is given)"
-    )
-
-    @field_validator("name")
-    @classmethod
-    def _known(cls, value: str) -> str:
-        if value not in FAMILIES:
-            raise problem(f"unknown family {value!r}{suggestion(value, FAMILIES)}")
-        return value
-
-
 def _read_tracks(ships: Any, info: ValidationInfo) -> Any:
     """Put the knots of CSV files in the place of their names, so that a scenario holds all that it needs."""
     if not isinstance(ships, Mapping):
@@ -342,9 +348,11 @@ class Scenario(Model):
     name: str = ""
     description: str = ""
     preset: Preset = Field(default="standard", description="original: constants and quirks of the simulator of 2017")
-    family: Annotated[Family, BeforeValidator(_family_by_name, json_schema_input_type=str | Family)] | None = Field(
+    base: str | None = Field(default=None, description="scenario by name or path that the other keys here change")
+    family: AnyFamily | None = Field(
         default=None, description="random family, by name or in full, that is drawn on top of the rest at every reset"
     )
+    scale: Positive = Field(default=1.0, description="of the distances by which a task observes and rewards")
     origin: Origin = Origin(latitude_deg=59.4377744115633, longitude_deg=10.4716511800410)
     simulation: Simulation = Simulation()
     weather: Weather = Weather()

@@ -89,6 +89,12 @@ class TaskConfig(Model):
     end_on_arrival: bool = True
     end_out_of_area: bool = True
 
+    def scaled(self, factor: float) -> TaskConfig:
+        """The same with the distances that were not asked for multiplied by a scenario's ``scale``."""
+        distances = ("range_scale", "distance_scale", "cross_track_scale", "radius_scale", "safe_distance")
+        usual = [name for name in distances if name not in self.model_fields_set]
+        return self.model_copy(update={name: factor * getattr(self, name) for name in usual}) if factor != 1.0 else self
+
 
 def task_config(arguments: Mapping[str, Any], reward: Mapping[str, float] | None) -> TaskConfig:
     """The task that keyword arguments of an environment describe.

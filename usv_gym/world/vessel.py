@@ -193,6 +193,8 @@ class KinematicModel(VesselFile):
     """
 
     model: Literal["kinematic"]
+    description: str = ""
+    source: str = ""
     default_action: Literal["heading_speed", "discrete"] = "heading_speed"
     turn_time: Positive = Field(description="time constant of the heading filter [s]")
     max_turn_rate_deg: Positive = Field(description="[deg/s]")
@@ -232,14 +234,16 @@ class PlantModel(VesselFile):
 VesselModel: TypeAlias = PlantModel | KinematicModel
 
 
-def load_vessel(name_or_path: str | Path) -> VesselModel:
-    """Read a vessel by the name of a shipped file (``"odin"``) or by path.
+def load_vessel(name_or_path: str | Path | KinematicModel) -> VesselModel:
+    """Read a vessel by the name of a shipped file (``"odin"``) or by path; one that a scenario describes is itself.
 
     Raises
     ------
     ConfigError
         one line per problem: the file, the key path, what was expected and the nearest known name.
     """
+    if isinstance(name_or_path, KinematicModel):
+        return name_or_path
     path = locate("vessels", str(name_or_path))
     return _load(path, path.stat().st_mtime_ns)
 

@@ -22,8 +22,8 @@ class FamilySpec:
     description: str
     vessels: int  #: most vessel slots it fills, the own ship's among them
     obstacles: int  #: most obstacle slots it fills
-    reach: float  #: [m] what a vessel can sail at cruising speed before time is up, where the scenario gives no duration
     module: str  #: below this package; kernels load with the first use
+    reach: float = 0.0  #: [m] what a vessel can sail at cruising speed before time is up, where nothing else says (`Family`)
 
     @property
     def sample(self) -> Sample:
@@ -35,5 +35,14 @@ class FamilySpec:
 FAMILIES: dict[str, FamilySpec] = {
     "open_sea": FamilySpec(
         "icebergs and crossing ships along a route", vessels=8, obstacles=16, reach=2500.0, module="open_sea"
+    ),
+    "imazu": FamilySpec(
+        "the 22 cases of Imazu: ships that all reach one point with the own ship", vessels=4, obstacles=0, module="imazu"
+    ),
+    "encounter": FamilySpec(
+        "ships in encounters of wanted classes, by distance and time of the closest point",
+        vessels=8,
+        obstacles=0,
+        module="encounter",
     ),
 }

@@ -9,37 +9,26 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from ... import rng
 from ...jit import inner, kernel, spliced
 from ...trig import PI, atan2, sincos
 from ...units import DEG
 from ...world.state import (
-    AFTER_CONTINUE,
     AFTER_STOP,
     AIS_CLASS_A,
     AIS_CLASS_B,
     AIS_NONE,
-    BEHAVIOUR_WAYPOINTS,
     KIND_BOAT,
     KIND_ICEBERG,
     KIND_SHIP,
     KIND_VESSEL,
-    MODEL_KINEMATIC,
 )
 from ...world.vessel import VesselModel
 from ..schema import Scenario
+from .common import between, put_ship
 
 #: most that the family puts into one world; fits the smallest capacity class
 MAX_SHIPS, MAX_ICEBERGS = 7, 16
-FIRST_MMSI = 257_000_001
-
-
-@inner
-def _between(w, slot, draw, low, high):
-    """A uniform number in [low, high) that belongs to (object slot, draw)."""
-    return low + (high - low) * rng.uniform(w.seed, rng.FAMILY, np.int64(slot), np.int64(draw))
 
 
 @inner
@@ -58,48 +47,19 @@ def _point_on_route(w, distance):
     return r.waypoint[0, 0, 0], r.waypoint[0, 0, 1], 0.0
 
 
-@inner
-def put_ship(w, j, kind, length, beam, speed, n0, e0, n1, e1):
-    """Put a kinematic ship of a class into slot j, from (n0, e0) towards (n1, e1) and on."""
-    v, r = w.vessels, w.routes
-    v.active[j] = 1
-    v.kind[j] = kind
-    v.model[j] = MODEL_KINEMATIC
-    v.behaviour[j] = BEHAVIOUR_WAYPOINTS
-    v.plant[j] = -1
-    v.eta[j, 0] = n0
-    v.eta[j, 1] = e0
-    v.eta[j, 2] = atan2(e1 - e0, n1 - n0)
-    v.length[j] = length
-    v.beam[j] = beam
-    v.speed[j] = speed
-    v.turn_time[j] = 10.0 if kind == KIND_SHIP else (6.0 if kind == KIND_VESSEL else 3.0)
-    v.turn_rate_max[j] = (1.0 if kind == KIND_SHIP else (3.0 if kind == KIND_VESSEL else 10.0)) * DEG
-    v.turn_decay[j] = 1.0 - math.exp(-w.frame_ticks * w.dt / v.turn_time[j])
-    v.mmsi[j] = FIRST_MMSI + j
-    r.waypoint[j, 0, 0] = n0
-    r.waypoint[j, 0, 1] = e0
-    r.waypoint[j, 1, 0] = n1
-    r.waypoint[j, 1, 1] = e1
-    r.count[j] = 2
-    r.leg[j] = 1
-    r.radius[j] = 50.0
-    r.after_last[j] = AFTER_CONTINUE
-
-
 @spliced
 def draw_open_sea(w, difficulty, cruise):
     """Draw route, icebergs and ships of an open sea into a template whose own ship is in place, from ``w.seed``."""
     v, r, m = w.vessels, w.routes, w.obstacles
     # the route: three legs of 250 to 450 m that turn by at most 40 deg
-    course = _between(w, 0, 0, -PI, PI)
+    course = between(w, 0, 0, -PI, PI)
     r.waypoint[0, 0, 0] = v.eta[0, 0]
     r.waypoint[0, 0, 1] = v.eta[0, 1]
     total = 0.0
     for k in range(1, 4):
-        length = _between(w, 0, 10 + k, 250.0, 450.0)
+        length = between(w, 0, 10 + k, 250.0, 450.0)
         if k > 1:
-            course += _between(w, 0, 20 + k, -40.0 * DEG, 40.0 * DEG)
+            course += between(w, 0, 20 + k, -40.0 * DEG, 40.0 * DEG)
         s, c = sincos(course)
         r.waypoint[0, k, 0] = r.waypoint[0, k - 1, 0] + length * c
         r.waypoint[0, k, 1] = r.waypoint[0, k - 1, 1] + length * s
@@ -111,13 +71,13 @@ def draw_open_sea(w, difficulty, cruise):
     v.eta[0, 2] = atan2(r.waypoint[0, 1, 1] - r.waypoint[0, 0, 1], r.waypoint[0, 1, 0] - r.waypoint[0, 0, 0])
     end_n, end_e = r.waypoint[0, 3, 0], r.waypoint[0, 3, 1]
 
-    bergs = int(2.0 + 12.0 * difficulty + _between(w, 0, 1, 0.0, 2.99))
+    bergs = int(2.0 + 12.0 * difficulty + between(w, 0, 1, 0.0, 2.99))
     spread = 160.0 - 90.0 * difficulty
     for i in range(min(bergs, MAX_ICEBERGS, m.active.shape[0])):
         slot = 100 + i
-        radius = _between(w, slot, 0, 5.0, 25.0)
+        radius = between(w, slot, 0, 5.0, 25.0)
         for attempt in range(20):
-            along = _between(w, slot, 10 + attempt, 120.0, total + 100.0)
+            along = between(w, slot, 10 + attempt, 120.0, total + 100.0)
             a, b = rng.normal2(w.seed, rng.FAMILY, slot, 50 + attempt)
             n, e, _ = _point_on_route(w, min(along, total))
             n += spread * a
@@ -135,29 +95,29 @@ def draw_open_sea(w, difficulty, cruise):
                 m.radius[i] = radius
                 break
 
-    ships = int(1.0 + 4.0 * difficulty + _between(w, 0, 2, 0.0, 1.99))
+    ships = int(1.0 + 4.0 * difficulty + between(w, 0, 2, 0.0, 1.99))
     for i in range(min(ships, MAX_SHIPS, v.active.shape[0] - 1)):
         j = 1 + i
         slot = 200 + i
-        pick = _between(w, slot, 0, 0.0, 1.0)
+        pick = between(w, slot, 0, 0.0, 1.0)
         kind = KIND_SHIP if pick < 0.3 else (KIND_VESSEL if pick < 0.65 else KIND_BOAT)
         if kind == KIND_SHIP:
-            length, speed = _between(w, slot, 1, 50.0, 120.0), _between(w, slot, 2, 4.0, 8.0)
+            length, speed = between(w, slot, 1, 50.0, 120.0), between(w, slot, 2, 4.0, 8.0)
         elif kind == KIND_VESSEL:
-            length, speed = _between(w, slot, 1, 15.0, 50.0), _between(w, slot, 2, 3.0, 7.0)
+            length, speed = between(w, slot, 1, 15.0, 50.0), between(w, slot, 2, 3.0, 7.0)
         else:
-            length, speed = _between(w, slot, 1, 5.0, 15.0), _between(w, slot, 2, 2.0, 9.0)
+            length, speed = between(w, slot, 1, 5.0, 15.0), between(w, slot, 2, 2.0, 9.0)
         v.ais_class[j] = AIS_CLASS_B if kind == KIND_BOAT else AIS_CLASS_A
-        if kind == KIND_BOAT and _between(w, slot, 3, 0.0, 1.0) < 0.5:
+        if kind == KIND_BOAT and between(w, slot, 3, 0.0, 1.0) < 0.5:
             v.ais_class[j] = AIS_NONE
         v.ais_on[j] = v.ais_class[j] != AIS_NONE
         for attempt in range(20):
             # meet at a point of the route, a little before or after the own ship gets there
-            along = _between(w, slot, 10 + attempt, 0.25 * total, 0.95 * total)
+            along = between(w, slot, 10 + attempt, 0.25 * total, 0.95 * total)
             n, e, own_course = _point_on_route(w, along)
-            relative = _between(w, slot, 40 + attempt, -PI, PI)
+            relative = between(w, slot, 40 + attempt, -PI, PI)
             s, c = sincos(own_course + relative)
-            when = max(along / cruise + _between(w, slot, 70 + attempt, -1.0, 1.0) * (60.0 - 45.0 * difficulty), 30.0)
+            when = max(along / cruise + between(w, slot, 70 + attempt, -1.0, 1.0) * (60.0 - 45.0 * difficulty), 30.0)
             n0, e0 = n - speed * c * when, e - speed * s * when
             if math.hypot(n0 - v.eta[0, 0], e0 - v.eta[0, 1]) < 150.0 + length:
                 continue
