@@ -90,6 +90,8 @@ class Voyage:
         self._orders = list(mission.orders)
         self.recorder = Recorder()
         self.recorder.sample(self.core.worlds)
+        if hasattr(self.controller, "attach"):  # it looks at sensors that no observation holds (hil.external)
+            self.controller.attach(self.core, 0, self.commands.called)
         if self.controller is not None:
             self.controller.reset({**self.core.info(0), "scales": self.core.scales()})
         self.step_count = 0

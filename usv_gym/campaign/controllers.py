@@ -102,6 +102,8 @@ class Helm:
         for b in np.flatnonzero(mask).tolist():
             info = {**core.info(b), "scales": core.scales()}
             only = np.arange(core.num) == b
+            if hasattr(self._each[b], "attach"):  # it looks at sensors that no observation holds (hil.external)
+                self._each[b].attach(core, b)
             self._call("reset", only, lambda b=b, info=info: self._each[b].reset(info), GRACE)
 
     def steer(self, mask: NDArray[np.bool_], step: int) -> NDArray[np.bool_]:

@@ -19,10 +19,13 @@ POLICIES: dict[str, tuple[str, str]] = {
 }
 #: drives the actuators from a recorded mission; needs no observation, so it is no controller
 THRUST_LOG = "thrust-log"
+#: ``PREFIX:ARGUMENT`` -> ``module:function`` that makes the controller; by name, because these stand above policies
+FACTORIES = {"hil": "usv_gym.hil.rig:policy"}
 
 
 def make_policy(name: str, *, trust: bool = False) -> Controller:
-    """A controller: built in, learned (a file), or of one's own (``module:Class`` or ``path.py:Class``).
+    """A controller: built in, learned (a file), behind a wire (``hil:RIG.yaml``), or of one's own
+    (``module:Class``, ``path.py:Class``).
 
     ``trust`` also takes files of stable-baselines3 that execute code when they are read; see
     :func:`~usv_gym.policies.learned.load_policy`.
@@ -36,6 +39,11 @@ def make_policy(name: str, *, trust: bool = False) -> Controller:
         module, _, cls = POLICIES[name][0].partition(":")
         controller: Controller = getattr(importlib.import_module(f"{__name__}.{module}"), cls)()
         return controller
+    prefix, _, argument = name.partition(":")
+    if prefix in FACTORIES:
+        module, _, function = FACTORIES[prefix].partition(":")
+        outside: Controller = getattr(importlib.import_module(module), function)(argument)
+        return outside
     if is_custom(name):
         from .custom import load_custom
 

@@ -1,0 +1,258 @@
+"""ROS 1 and ROS 2 for real: bridge and controller in processes of their own, over the loopback.
+
+Needs what ``ros/ros1_apt.sh`` installs, and an environment by ``ros/ros2_venv.sh`` in ``.ros2``, or where ``USV_GYM_ROS2``
+says.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hil_helpers import EXAMPLES, ROOT, ROUTE, end, expected, free_port, spawn
+
+from usv_gym.replay.archive import load
+from usv_gym.run import resimulate
+
+TESTS = Path(__file__).parent
+STEPS = 200
+
+
+# --- what is here ----------------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def ros2():
+    """Python of an environment with rclpy, and the variables that keep it on this machine."""
+    python = Path(os.environ.get("USV_GYM_ROS2", ROOT / ".ros2")) / "bin" / "python"
+    if not python.is_file():
+        pytest.skip("no ROS 2: ros/ros2_venv.sh .ros2 $(which python)")
+    profile = ROOT / "ros" / "fastdds_loopback.xml"
+    return python, {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": str(20 + os.getpid() % 80),
+        "FASTDDS_DEFAULT_PROFILES_FILE": str(profile), "PYTHONPATH": str(TESTS),
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def ros1(tmp_path_factory):
+    """Environment of a graph with a master of its own, and Python classes built from the original's definitions."""
+    if not Path("/usr/bin/rosmaster").exists() or not Path("/usr/lib/genpy/genmsg_py.py").exists():
+        pytest.skip("no ROS 1: sudo ros/ros1_apt.sh")
+    home = tmp_path_factory.mktemp("ros1")
+    subprocess.run([ROOT / "ros" / "ros1_messages.sh", home / "messages"], check=True, capture_output=True)
+    environment = {
+        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}", "ROS_IP": "127.0.0.1",
+        "ROS_HOME": str(home), "ROS_LOG_DIR": str(home),
+        "CONTROL_PATH": f"{home / 'messages'}:{TESTS}:{EXAMPLES}",
+    }  # fmt: skip
+    master = start_master(environment)
+    yield environment
+    end(master)
+
+
+def start_master(environment):
+    port = environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
+    master = spawn(
+        "/usr/bin/rosmaster",
+        "--core",
+        "-p",
+        port,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    import xmlrpc.client
+
+    until = time.monotonic() + 15
+    while True:
+        try:
+            with xmlrpc.client.ServerProxy(environment["ROS_MASTER_URI"]) as proxy:
+                proxy.getPid("/test")
+            return master
+        except OSError:
+            assert time.monotonic() < until, "the master does not start"
+            time.sleep(0.05)
+
+
+def bridge(python, environment, out, *arguments, **kwargs):
+    """`usv-gym hil` as a process."""
+    return spawn(python, "-m", "usv_gym.cli", "hil", "calm_crossing", "--out", out, *arguments,
+                 env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **kwargs)  # fmt: skip
+
+
+def finish(process, timeout=90):
+    text, _ = process.communicate(timeout=timeout)
+    assert process.returncode == 0, text
+    return text
+
+
+def median_round_trip(text):
+    """[ms]"""
+    return float(re.search(r"round trip \[ms\]: median ([0-9.]+)", text)[1])
+
+
+def check_lock_step(out):
+    """What was decoded is what was sent, and the plain episode is the same bit for bit."""
+    episode = load(out / "episode.usv")
+    np.testing.assert_allclose(episode.actions, [expected(step) for step in range(1, STEPS + 1)], rtol=0, atol=1e-15)
+    again = resimulate(episode)
+    for name in ("eta", "nu", "nav", "command", "detections", "ais"):
+        assert getattr(again, name).tobytes() == getattr(episode, name).tobytes(), name
+
+
+# --- ROS 1 -----------------------------------------------------------------------------------------------------------
+def test_ros1_lock_step_is_the_plain_environment_bit_for_bit(ros1, tmp_path):
+    peer = spawn("/usr/bin/python3", TESTS / "hil_ros1_peer.py", "1496318400000000000", "50000000",
+                 env={**ros1, "PYTHONPATH": ros1["CONTROL_PATH"]})  # fmt: skip
+    try:
+        text = finish(bridge(sys.executable, ros1, tmp_path, "--backend", "ros1", "--profile", "hilsim", "--lock-step",
+                             "--interval", "0.05", "--duration", "10"))  # fmt: skip
+    finally:
+        end(peer)
+    print(text)
+    check_lock_step(tmp_path)
+    assert median_round_trip(text) < 5.0
+
+
+def test_ros1_messages_have_the_sums_of_the_original(ros1):
+    sums = {
+        "AIS": "c4b02c9a2cf4071b973def961612a531", "ActuatorMessage": "7b1b9cdb6c5ba146c90a40c3498d18b1",
+        "Environment": "c7b07d3af6ed0820d5cb2f920af3dd4f", "Gps": "fabe52f68c7f92616561ddbc3f435aee",
+        "detectedTarget": "4e4eb8dc86e32bf5d4f58ee71d8a0931", "obstacleCmd": "73d0006ff3da56034acc0179aa503208",
+        "obstacleUpdate": "6b79b1e1cd58c9c2f5f923b5c951ba08",
+    }  # fmt: skip
+    code = "import json, sys, simulator_messages.msg as m; print(json.dumps({n: getattr(m, n)._md5sum for n in sys.argv[1:]}))"
+    environment = {**os.environ, "PYTHONPATH": ros1["CONTROL_PATH"]}
+    built = subprocess.run(
+        ["/usr/bin/python3", "-c", code, *sums], env=environment, capture_output=True, text=True, check=True
+    )
+    assert json.loads(built.stdout) == sums
+    code = """
+import json, sys
+from usv_gym.hil.backends import ros1
+ros1._rospy()
+print(json.dumps({n: ros1.message_class(f"simulator_messages/{n}", "")._md5sum for n in sys.argv[1:]}))
+"""
+    made = subprocess.run([sys.executable, "-c", code, *sums], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert json.loads(made.stdout) == sums  # as the bridge generates them at run time
+
+
+class Lines:
+    """What a process says, line by line."""
+
+    def __init__(self, process):
+        self.process, self.lines = process, []
+        self.thread = threading.Thread(target=self._read, daemon=True)
+        self.thread.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line)
+
+    def wait(self, text, count=1, seconds=60.0):
+        until = time.monotonic() + seconds
+        while sum(text in line for line in self.lines) < count:
+            assert time.monotonic() < until, f"no {text!r} in {self.lines}"
+            assert self.process.poll() is None, self.lines
+            time.sleep(0.02)
+
+
+def test_ros1_survives_its_controller_and_its_master(ros1, tmp_path):
+    """Real time: the example controller is killed and started again; then the master is, and the controller once more."""
+    ros1 = {**ros1, "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}"}
+    control = {**ros1, "PYTHONPATH": ros1["CONTROL_PATH"]}
+
+    def controller():
+        return spawn("/usr/bin/python3", EXAMPLES / "ros1_controller.py", "--route", *ROUTE, env=control)
+
+    master = start_master(ros1)
+    running = bridge(sys.executable, ros1, tmp_path, "--backend", "ros1", "--profile", "hilsim", "--realtime", "2")
+    said = Lines(running)
+    process = None
+    try:
+        said.wait("failsafe_on")  # nobody is there yet
+        process = controller()
+        said.wait("failsafe_off")
+        process.kill()
+        process.wait()
+        said.wait("failsafe_on", 2)
+        process = controller()
+        said.wait("failsafe_off", 2)
+        end(master)
+        time.sleep(1.2)  # connections stand without it
+        assert sum("failsafe_on" in line for line in said.lines) == 2
+        master = start_master(ros1)
+        process.kill()
+        process.wait()
+        said.wait("failsafe_on", 3)
+        time.sleep(1.5)  # the bridge registers again
+        process = controller()
+        said.wait("failsafe_off", 3)
+        running.send_signal(signal.SIGINT)
+        assert running.wait(30) == 0
+    finally:
+        for each in (process, master, running):
+            if each is not None:
+                end(each)
+        said.thread.join(5)
+        running.stdout.close()
+    print("".join(said.lines))
+    times = [float(line.split()[0][2:]) for line in said.lines if line.startswith("t=") and "failsafe" in line]
+    assert times == sorted(times)
+    assert any("master was away 1" in line for line in said.lines)
+    assert "episode.usv" in said.lines[-1]  # Ctrl-C loses nothing
+
+
+# --- ROS 2 -----------------------------------------------------------------------------------------------------------
+def test_ros2_lock_step_is_the_plain_environment_bit_for_bit(ros2, tmp_path):
+    python, environment = ros2
+    peer = spawn(python, TESTS / "hil_ros2_peer.py", str(STEPS), env=environment)
+    try:
+        text = finish(bridge(python, environment, tmp_path, "--backend", "ros2", "--lock-step", "--interval", "0.05",
+                             "--duration", "10"))  # fmt: skip
+    finally:
+        end(peer)
+    print(text)
+    check_lock_step(tmp_path)
+    assert median_round_trip(text) < 20.0  # 5 ms on a quiet machine (benchmarks/hil.py)
+
+
+def test_ros2_example_avoids_the_crossing_ship_and_a_bare_dds_peer_reads_along(ros2, tmp_path):
+    """Real time, six times as fast; CycloneDDS, another implementation of the protocol, reads what we publish."""
+    python, environment = ros2
+    running = bridge(python, environment, tmp_path, "--backend", "ros2", "--control", "heading_speed", "--realtime", "6",
+                     "--duration", "110", "--start",
+                     f"{python} {EXAMPLES / 'ros2_controller.py'} --route {' '.join(ROUTE)}")  # fmt: skip
+    try:
+        pytest.importorskip("cyclonedds")
+        seen = json.loads(subprocess.run(
+            [sys.executable, TESTS / "hil_dds_reader.py", environment["ROS_DOMAIN_ID"], "6"],
+            capture_output=True, text=True, check=True, timeout=60).stdout)  # fmt: skip
+        text = finish(running)
+    finally:
+        end(running)
+    print(text)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["collisions"] == []
+    closest = {thing["name"]: thing["closest_m"] for thing in summary["objects"]}
+    assert closest["coaster"] > 30.0
+    episode = load(tmp_path / "episode.usv")
+    assert len(seen["clock"]) > 20
+    assert np.all(np.diff(seen["clock"]) > 0)
+    assert len(seen["heading_speed"]) > 10
+    rows = {round(t, 3): k for k, t in enumerate(episode.t.tolist())}
+    origin, scale = episode.meta["origin"], episode.meta["metres_per_degree"]
+    assert len(seen["fix"]) > 20
+    for stamp, latitude, longitude in seen["fix"]:
+        k = rows[round(stamp - episode.meta["epoch_us"] / 1e6, 3)]
+        assert [(latitude - origin[0]) * scale[0], (longitude - origin[1]) * scale[1]] == pytest.approx(
+            episode.nav[k, 1:3], abs=1e-5
+        )
