@@ -321,7 +321,7 @@ class Bridge:
 
     # --- the own ship elsewhere ---------------------------------------------------------------------------------------
     def _local(self, latitude: float, longitude: float) -> tuple[float, float]:
-        from ..scenarios.schema import GeoPoint
+        from ..scenarios.places import GeoPoint
 
         return self.mission.scenario.local(GeoPoint(latitude_deg=latitude, longitude_deg=longitude))
 
