@@ -124,7 +124,7 @@ def evaluate(x: Trajectory, requirements: Mapping[str, Requirement], params: Par
         for b in range(len(x)):
             for j in range(x.vessels):
                 wanted = [r for r in by_rtamt if not np.isnan(value[r, b, j])]
-                if not wanted:
+                if not wanted or x.steps[b] < 2:  # rtamt knows no trace of one sample
                     continue
                 known = signals(x, b, -1 if j == x.own[b] else j, params)
                 for r in wanted:
@@ -135,7 +135,8 @@ def evaluate(x: Trajectory, requirements: Mapping[str, Requirement], params: Par
 
 def sample_interval(x: Trajectory) -> float:
     """Time between samples [s]: the control interval (the last one may be cut short by a contact)."""
-    return float(np.round(x.t[0, 1] - x.t[0, 0], 6)) if len(x) and x.steps[0] > 1 else 1.0
+    more = np.flatnonzero(x.steps > 1)
+    return float(np.round((x.t[more, 1] - x.t[more, 0]).max(), 6)) if len(more) else 1.0
 
 
 def _by_kernels(
