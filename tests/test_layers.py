@@ -18,7 +18,7 @@ LAYERS = (
     "world",  # truth
     "sensors traffic",  # the picture; how ships move
     "events engine scenarios",  # one tick; where worlds come from
-    "tasks metrics colregs policies",  # the decision problem, how it is judged, who decides
+    "metrics colregs tasks policies",  # the decision problem, how it is judged, who decides
     "render.palette replay render envs",  # archive and outputs, map, faces
     "voyage run play live sb3 train traffic_v0 campaign hil",  # jobs and further faces
     "cli",

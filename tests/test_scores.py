@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from meeting import meeting
 
 from usv_gym.colregs import scores as s
+from usv_gym.colregs.alternatives import set_b, set_c
 from usv_gym.colregs.params import PUBLISHED, Params
 from usv_gym.colregs.trajectory import Trajectory
 from usv_gym.colregs.verdict import judge
@@ -327,3 +328,28 @@ def test_parameters_say_what_is_wrong():
         validate(Params, Document("params", {"r3": 2000.0}))
     with pytest.raises(ConfigError, match=r"unknown key; did you mean 'r_pref'"):
         validate(Params, Document("params", {"r_perf": 100.0}))
+
+
+# --- other sets ------------------------------------------------------------------------------------------------------
+def test_set_c_adds_shares():
+    # 60 deg to starboard at 100 s of the crossing that begins at 32 s, 268 s before the CPA: early, to starboard, and
+    # 290 m are more than the 165 m that are safe: 0.3 + 0.3 + 0.4
+    x = meeting([(100, 0, 5), (60, 60, 5), (400, 0, 5)], [(600, 270, 5)], [1500, 1500])
+    scores = judge(x, PUBLISHED, set_c).scores
+    assert scores["r15"][0] == scores["r16"][0] == pytest.approx(1.0)
+    # nothing done, 100 m apart: 0.4 * 100 / 165
+    x = meeting([(600, 0, 5)], [(600, 270, 5)], [1500, 1500 + 100 * math.sqrt(2)])
+    assert judge(x, PUBLISHED, set_c).scores["r15"][0] == pytest.approx(0.4 * 100 / 165, rel=1e-4)
+
+
+def test_set_b_of_ships_in_open_waters():
+    # 900 m apart: S_r = 1 - 0.4 (1000 - 900) / 200 = 0.8; abeam to port of each other S_theta = 1: S = 0.9
+    x = meeting([(600, 0, 5)], [(600, 180, 5)], [1800, -60])
+    x.eta[0, :, 1, 1] -= 840
+    wide = Params(scaled=False, r2=5000, r_pref=1500, r_min=1000, r_nm=800, r_col=200)
+    verdict = judge(x, wide, set_b)
+    e = verdict.encounters
+    assert e["cpa_range"] == pytest.approx(900.0)
+    assert verdict.parts["s_range"][0] == pytest.approx(0.8)
+    assert verdict.scores["safety"][0] == pytest.approx(0.9)
+    assert verdict.why(0).count(":") == 0  # their reasons are not put into words

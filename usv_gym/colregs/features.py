@@ -17,7 +17,8 @@ from ..jit import inner, kernel, spliced
 from ..trig import atan2, sincos, wrap
 from ..world.encounter import SAFE
 from ..world.geometry import CLOSE, far_distance, hull_hull, hull_vertices
-from .machine import EM, advance, pair_dtype
+from ..world.state import pair_dtype
+from .machine import EM, advance, domain_ratio
 from .params import Params
 from .trajectory import Trajectory
 
@@ -31,7 +32,7 @@ def encounter_dtype() -> np.dtype[Any]:
     f8 = "f8"
     seen = [  # between start and CPA
         ("turn_starboard", f8), ("turn_port", f8), ("turn_time", f8),  # largest changes of course, >= 0; time of the larger
-        ("slowed", f8), ("slowed_time", f8),  # largest relative loss of speed, >= 0
+        ("slowed", f8), ("slowed_time", f8), ("sped", f8),  # largest relative loss of speed, >= 0; largest gain
         ("manoeuvre_time", f8), ("manoeuvre_range", f8),  # the first detectable one
         # the same from the first sample of stages 2 and 3 on, while in them: either way
         ("turn2", f8), ("turn2_time", f8), ("change2", f8), ("change2_time", f8),
@@ -50,6 +51,7 @@ def encounter_dtype() -> np.dtype[Any]:
         ("start_speed", f8), ("start_target_speed", f8),  # [m/s]
         ("cpa_time", f8), ("cpa_range", f8), ("cpa_alpha", f8), ("cpa_beta", f8),
         ("clearance", f8), ("clearance_time", f8),  # smallest hull distance [m]
+        ("domain", f8),  # smallest place of the own ship in the other's domain: 1 on its border
         ("seen", np.dtype(seen, align=True)),
     ], align=True)  # fmt: skip
 
@@ -88,8 +90,8 @@ def _begin(e, seen, pair, b, j, t, speed1, speed2):
     e.start_alpha, e.start_beta = pair.alpha, pair.beta
     e.start_speed, e.start_target_speed = speed1, speed2
     e.cpa_time, e.cpa_range, e.cpa_alpha, e.cpa_beta = t, pair.range, pair.alpha, pair.beta
-    e.clearance, e.clearance_time = math.inf, t
-    seen.turn_starboard = seen.turn_port = seen.slowed = 0.0
+    e.clearance, e.clearance_time, e.domain = math.inf, t, math.inf
+    seen.turn_starboard = seen.turn_port = seen.slowed = seen.sped = 0.0
     seen.turn2 = seen.turn3 = seen.change2 = seen.change3 = seen.port4 = 0.0
     seen.turn_time = seen.slowed_time = seen.manoeuvre_time = seen.manoeuvre_range = math.nan
     seen.turn2_time = seen.turn3_time = seen.change2_time = seen.change3_time = seen.port4_time = math.nan
@@ -113,6 +115,7 @@ def _observe(seen, e, p, pair, t, turn, change, turn_rate, acceleration, ref):
         seen.turn_port = -turn
     if -change > seen.slowed:
         seen.slowed, seen.slowed_time = -change, t
+    seen.sped = max(seen.sped, change)
     if seen.manoeuvre_time != seen.manoeuvre_time:
         turns = abs(turn_rate) >= p.turn_rate_md and abs(turn) > p.course_md
         if turns or (abs(acceleration) >= p.acceleration_md and abs(change) > p.speed_md):
@@ -265,6 +268,8 @@ def find_encounters(params, t, eta, velocity, active, steps, ready, own, length,
                     e, hulls, k, 1.0, t[b], eta[b, :, i], eta[b, :, j], l1, b1, l2, b2, course1, course2
                 ):
                     e.seen = seen
+                e.domain = min(e.domain, domain_ratio(eta[b, k, i, 0], eta[b, k, i, 1], eta[b, k, j, 0], eta[b, k, j, 1],
+                                                      course2[k], l2))  # fmt: skip
                 e.end = t[b, k]
                 e.complete = pair.tcpa <= 0.0
     return count

@@ -1,4 +1,4 @@
-"""What two vessels are to each other over time: a state machine with memory, one small record per pair.
+"""What two vessels are to each other over time: a state machine with memory, one small record (``pair_dtype``) per pair.
 
 An encounter begins at the first sample in which both are under way, nearer than R2, with the closest point ahead of them and
 nearer than R_pref (risk of collision, Rule 7), in one of the sectors of Rules 13 to 15.  Its class is then locked, whatever
@@ -8,31 +8,15 @@ of Eriksen et al. 2020, Frontiers in Robotics and AI 7:11.)
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Any
-
-import numpy as np
 
 from ..jit import inner
+from ..trig import sincos
 from ..world.encounter import CROSSING_GIVE_WAY, HEAD_ON, OVERTAKING, SAFE, bearings, cpa, situation
 
 #: states, as in the literature: safe, overtaking, head-on, give-way, stand-on (also: being overtaken), emergency
 SF, OT, HO, GW, SO, EM = range(6)
 STATES = ("SF", "OT", "HO", "GW", "SO", "EM")
-
-
-@functools.cache
-def pair_dtype() -> np.dtype[Any]:
-    """dtype of what is remembered of a pair; all zeros is "safe, never met"."""
-    return np.dtype([
-        ("state", "i1"), ("code", "i1"),  # SF..EM; Encounter, locked while not SAFE
-        ("stage", "i1"),  # 1 far .. 4 close, by range
-        ("size", "f8"),  # k_size of the pair
-        ("r2", "f8"), ("r3", "f8"), ("r4", "f8"), ("r_pref", "f8"),  # [m] of this encounter
-        ("range", "f8"), ("dcpa", "f8"), ("tcpa", "f8"),  # [m], [m], [s] now
-        ("alpha", "f8"), ("beta", "f8"),  # contact angle, relative bearing now [rad]
-    ], align=True)  # fmt: skip
 
 
 @inner
@@ -79,3 +63,15 @@ def advance(pair, p, n1, e1, vn1, ve1, course1, length1, n2, e2, vn2, ve2, cours
     pair.state = duty(pair.code)
     if (pair.state == GW or pair.state == HO) and emergency and pair.tcpa > 0.0:
         pair.state = EM
+
+
+@inner
+def domain_ratio(n1, e1, n2, e2, course2, length2):
+    """Where vessel 1 is in the ship domain of vessel 2: 1 on its border, less inside.
+
+    The ellipse of Fujii and Tanaka (1971, Journal of Navigation 24:4): semi-axes of 4 and 1.6 lengths, along and across.
+    """
+    s, c = sincos(course2)
+    along = ((n1 - n2) * c + (e1 - e2) * s) / (4.0 * length2)
+    across = ((e1 - e2) * c - (n1 - n2) * s) / (1.6 * length2)
+    return math.sqrt(along * along + across * across)

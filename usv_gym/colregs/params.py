@@ -83,5 +83,6 @@ PROFILES: dict[ProfileName, Params] = {
 def params_dtype() -> np.dtype[Any]:
     """dtype of the part of the parameters that kernels need."""
     names = ("r2", "r3", "r4", "r_pref", "scaled", "reference_length", "reference_speed", "moving", "exit_factor",
-             "emergency_tcpa", "course_md", "speed_md", "turn_rate_md", "acceleration_md")  # fmt: skip
+             "emergency_tcpa", "course_md", "course_app", "speed_md", "speed_app", "turn_rate_md",
+             "acceleration_md")  # fmt: skip
     return np.dtype([(name, "f8") for name in names])

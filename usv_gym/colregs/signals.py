@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..jit import inner, kernel, spliced
 from ..units import DEG
 from ..world.encounter import CROSSING_GIVE_WAY, CROSSING_STAND_ON, HEAD_ON, OVERTAKEN, OVERTAKING, SAFE
+from ..world.state import pair_dtype
 from .features import closest_fraction, courses, hull_distance_at, under_way
-from .machine import EM, advance, pair_dtype, size_factor
+from .machine import EM, advance, domain_ratio, size_factor
 from .params import Params
 from .stl_kernels import worst_sample
 from .trajectory import Floats, Trajectory
@@ -47,6 +48,7 @@ SIGNALS = tuple(Signal(name, unit, bool(of_pair), meaning) for name, unit, of_pa
     ("d_pref", "m", 1, "clearance that set A prefers for these two vessels: k (R_pref - R_col)"),
     ("d_min", "m", 1, "least acceptable clearance: k (R_min - R_col)"),
     ("d_nm", "m", 1, "clearance of a near miss: k (R_nm - R_col)"),
+    ("domain", "", 1, "where the own ship is in the other's domain (4 by 1.6 lengths): 1 on its border, less inside"),
     ("dcpa", "m", 1, "distance of the closest point of approach, centre to centre"),
     ("tcpa", "s", 1, "time to it; negative when it is past"),
     ("bearing", "deg", 1, "beta: the other off the own bow, clockwise, -180..180"),
@@ -70,8 +72,8 @@ SIGNALS = tuple(Signal(name, unit, bool(of_pair), meaning) for name, unit, of_pa
 NAMES = tuple(signal.name for signal in SIGNALS)
 (
     _T, _REMAINING, _SPEED, _TURN_RATE, _OBSTACLE, _ARRIVED, _COLLIDED, _STOPPING, _RANGE, _CLEARANCE, _D_PREF, _D_MIN, _D_NM,
-    _DCPA, _TCPA, _BEARING, _CONTACT, _TARGET_SPEED, _STAGE, _COURSE_CHANGE, _SPEED_CHANGE, _TRACKED, _ENCOUNTER, _START,
-    _PASSING, _PASSED, _HEAD_ON, _GIVE_WAY, _STAND_ON, _OVERTAKING, _OVERTAKEN, _EMERGENCY,
+    _DOMAIN, _DCPA, _TCPA, _BEARING, _CONTACT, _TARGET_SPEED, _STAGE, _COURSE_CHANGE, _SPEED_CHANGE, _TRACKED, _ENCOUNTER,
+    _START, _PASSING, _PASSED, _HEAD_ON, _GIVE_WAY, _STAND_ON, _OVERTAKING, _OVERTAKEN, _EMERGENCY,
 ) = range(len(NAMES))  # fmt: skip
 STOP_TIME = 8.0  #: [s] time constant of the loss of speed: what `avoid` assumes of its vessels
 
@@ -132,6 +134,9 @@ def write_signals(p, d, x, n, b, i, j, ready, course1, speed1, course2, speed2, 
             first = k
             passed = False
         out[_RANGE, k], out[_DCPA, k] = pair.range, pair.dcpa
+        out[_DOMAIN, k] = MODE
+        if there:
+            out[_DOMAIN, k] = domain_ratio(eta[b, k, i, 0], eta[b, k, i, 1], eta[b, k, j, 0], eta[b, k, j, 1], course2[k], l2)
         out[_TCPA, k] = min(max(pair.tcpa, -MODE), MODE)
         out[_D_PREF, k], out[_D_MIN, k], out[_D_NM, k] = size * d[0], size * d[1], size * d[2]
         out[_BEARING, k], out[_CONTACT, k] = pair.beta / DEG, pair.alpha / DEG

@@ -33,6 +33,7 @@ class Verdict:
     encounters: NDArray[Any]  # [n] of features.encounter_dtype, by row, ship, time
     scores: dict[str, Floats]  # [n] each; NaN where a rule says nothing of the encounter
     parts: dict[str, Floats]  # [n] each
+    scoring: Scoring
 
     def __len__(self) -> int:
         return len(self.episodes["time"])
@@ -49,7 +50,7 @@ class Verdict:
         """One encounter as a flat row: numbers, the class as text, and ``why``: what its lowest score lost, and when."""
         e, out = self.encounters[i], {}
         for name in ("row", "ship", "complete", "contact", "start", "end", "start_range", "start_dcpa", "start_tcpa",
-                     "cpa_time", "cpa_range", "clearance", "clearance_time"):  # fmt: skip
+                     "cpa_time", "cpa_range", "clearance", "clearance_time", "domain"):  # fmt: skip
             out[name] = e[name].item()
         out["class"] = Encounter(e["code"]).name.lower()
         for name in ("start_alpha", "start_beta", "cpa_alpha", "cpa_beta"):
@@ -67,7 +68,7 @@ class Verdict:
         """The lowest score of encounter i, and in words what cost it, the dearest first."""
         known = {name: values[i] for name, values in self.scores.items() if not math.isnan(values[i]) and name in SCORES}
         lowest = min(known, key=lambda name: float(known[name]))
-        causes = reasons(self.encounters[i], self.params, lowest)
+        causes = reasons(self.encounters[i], self.params, lowest) if self.scoring is set_a else []
         said = "; ".join(f"{text} at {t:.0f} s (-{loss:.2f})" for loss, t, text in causes[:3])
         name = "safety" if lowest == "safety" else f"rule {lowest[1:]}"
         so_far = "" if self.encounters["complete"][i] else ", not over yet"
@@ -117,6 +118,9 @@ def judge(trajectory: Trajectory, params: Params | None = None, scoring: Scoring
     for code in Encounter:
         if code is not Encounter.SAFE:
             episodes[code.name.lower()] = np.bincount(encounters["row"][encounters["code"] == code], minlength=B)
+    domain = np.full(B, np.inf)
+    np.minimum.at(domain, encounters["row"], encounters["domain"])
+    episodes["domain_min"] = np.where(np.isfinite(domain), domain, np.nan)
     for name, value in values.items():
         counts = complete & ~np.isnan(value)
         at = encounters["row"][counts]
@@ -125,7 +129,7 @@ def judge(trajectory: Trajectory, params: Params | None = None, scoring: Scoring
         worst = np.full(B, np.inf)
         np.minimum.at(worst, at, value[counts])
         episodes[f"{name}_min"] = np.where(n > 0, worst, np.nan)
-    return Verdict(params, episodes, encounters, values, made_of)
+    return Verdict(params, episodes, encounters, values, made_of, scoring)
 
 
 @functools.cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ..colregs.duty import rule_terms
 from ..engine import reset_world, tick_world
 from ..jit import inner, kernel, spliced
 from ..traffic.ships import move_traffic
@@ -38,6 +39,8 @@ def begin_episodes(w, land, tracks, tasks, episodes):
         episode = episodes[o]
         own = w.observer[o]
         episode.step = 0
+        for j in range(w.vessels.active.shape[0]):
+            w.pairs[o, j].code = w.pairs[o, j].state = 0
         episode.to_go = distance_to_go(w, own)
         episode.heading_ref = w.nav.mru_heading[o]
         episode.speed_ref = w.vessels.nu[own, 0]
@@ -126,6 +129,8 @@ def _judge(w, o, task, episode):
     terms[6] = 1.0 if arrival and episode.arrived == 0 and not (collision or grounding) else 0.0
     terms[7] = -1.0 if outside else 0.0
     terms[8] = -1.0 if grounding and episode.grounded == 0 else 0.0
+    if task.rules:
+        terms[9], terms[10] = rule_terms(w, o, task.colregs)
     episode.reward = 0.0
     for i in range(terms.shape[0]):
         episode.reward += task.weight[i] * terms[i]

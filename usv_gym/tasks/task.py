@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from ..colregs.params import Params, params_dtype
 from ..config import ConfigError, Document, Model, validate
 from ..world.state import A
 
@@ -47,7 +48,8 @@ TARGET_FEATURES = (
 )  # fmt: skip
 N_OWN, N_TARGET = len(OWN_FEATURES), len(TARGET_FEATURES)
 
-TERMS = ("progress", "cross_track", "proximity", "effort", "time", "collision", "arrival", "out_of_area", "grounding")
+TERMS = ("progress", "cross_track", "proximity", "effort", "time", "collision", "arrival", "out_of_area", "grounding",
+         "risk", "colregs")  # fmt: skip
 N_TERMS = len(TERMS)
 
 #: effects of the actions of ``discrete``: change of heading [deg], of speed [share of max speed]
@@ -67,6 +69,9 @@ class RewardWeights(Model):
     arrival: float = 20.0  #: +1 when the last waypoint is reached
     out_of_area: float = 20.0  #: -1 when the area is left
     grounding: float = 50.0  #: -1 when the hull first touches land
+    # the two that follow are only worked out where their weight is not 0 (colregs/duty.py)
+    risk: float = 0.0  #: -(1 - DCPA / preferred) (1 - range / R2) of the ship with the largest risk of collision
+    colregs: float = 0.0  #: -1 for a duty of Rules 8 and 13 to 17 that is not done at all, 0 for one that is
 
 
 class TaskConfig(Model):
@@ -128,6 +133,7 @@ def task_dtype() -> np.dtype[Any]:
         ("range_scale", "f8"), ("distance_scale", "f8"), ("cross_track_scale", "f8"), ("target_speed_scale", "f8"),
         ("radius_scale", "f8"), ("rate_scale", "f8"), ("safe_distance", "f8"),
         ("weight", "f8", (N_TERMS,)),
+        ("rules", "i1"), ("colregs", params_dtype()),  # whether the terms of the rules are wanted; their parameters
         ("end_on_collision", "i1"), ("end_on_arrival", "i1"), ("end_out_of_area", "i1"),
     ], align=True)  # fmt: skip
 
@@ -204,6 +210,8 @@ def task_record(config: TaskConfig, vessel: Vessel, control_ticks: int, max_step
                   "end_out_of_area"):  # fmt: skip
         row[field] = getattr(config, field)
     row["weight"] = [getattr(config.reward, name) for name in TERMS]
+    row["rules"] = config.reward.risk != 0.0 or config.reward.colregs != 0.0
+    row["colregs"] = Params().record()[0]
     return task
 
 

@@ -233,6 +233,20 @@ def _obstacles(M: int) -> Dtype:
     ], align=True)  # fmt: skip
 
 
+@functools.cache
+def pair_dtype() -> Dtype:
+    """What is remembered of an own ship and one other (usv_gym/colregs/machine.py); all zeros is "safe, never met"."""
+    return np.dtype([
+        ("state", i1), ("code", i1),  # machine.SF..EM; encounter.Encounter, locked while not SAFE
+        ("stage", i1), ("passed", i1),  # 1 far .. 4 close, by range; the closest point of this encounter is past
+        ("size", f8),  # k_size of the pair
+        ("r2", f8), ("r3", f8), ("r4", f8), ("r_pref", f8),  # [m] of this encounter
+        ("range", f8), ("dcpa", f8), ("tcpa", f8),  # [m], [m], [s] now
+        ("alpha", f8), ("beta", f8),  # contact angle, relative bearing now [rad]
+        ("course", f8), ("speed", f8),  # own, as the encounter began [rad], [m/s]
+    ], align=True)  # fmt: skip
+
+
 def _safety(O: int, S: int) -> Dtype:
     """Truth about distances between each observer's hull and every source, kept by the collision sweep."""
     return np.dtype([
@@ -389,7 +403,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         # the last so many obstacle slots stay inactive: targets that are not there; with clutter the last of these are those of
         # the radar's and the LiDAR's false alarms, the others of spoofed AIS stations
         ("phantoms", i4), ("clutter", i1),
-        ("safety", _safety(O, S)),
+        ("safety", _safety(O, S)), ("pairs", pair_dtype(), (O, V)),  # kept while a reward term asks for it
         ("sensors", _sensors()), ("observer", i2, (O,)),  # vessel slot of each observer
         ("ais", _ais(O, S)), ("nav", _nav(O)), ("tracks", _tracks(O, S)), ("picture", _picture(O, S)),
         # work space of the shadow test (sensors/shadow.py) and of the hull distance (world/geometry.py)
