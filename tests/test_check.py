@@ -131,7 +131,7 @@ def test_every_trouble_is_reported_with_its_cause_and_the_rest_goes_on(flown):
     assert "check_wrong.yaml:6: checks.it.asert: unknown key" in by_name["check_wrong.yaml"].error
     assert "unknown policy 'avoidd'" in by_name["unknown"].error
     assert [faults(r) for r in by_name["raises"].results] == [
-        ["act() at step 3 (t = 3 s) raised ValueError: lost my way (mine.py:14)"]
+        ["act() at step 3 (t = 3 s) raised ValueError: lost my way (mine.py:15)"]
     ] * 2
     assert faults(by_name["nan"].results[0]) == ["act() at step 0 (t = 0 s) returned [nan, 0.0]: expected finite numbers"]
     (hung,) = faults(by_name["hangs"].results[0])

@@ -344,12 +344,11 @@ def test_set_c_adds_shares():
 
 def test_set_b_of_ships_in_open_waters():
     # 900 m apart: S_r = 1 - 0.4 (1000 - 900) / 200 = 0.8; abeam to port of each other S_theta = 1: S = 0.9
-    x = meeting([(600, 0, 5)], [(600, 180, 5)], [1800, -60])
-    x.eta[0, :, 1, 1] -= 840
+    x = meeting([(600, 0, 5)], [(600, 180, 5)], [4500, -900])
     wide = Params(scaled=False, r2=5000, r_pref=1500, r_min=1000, r_nm=800, r_col=200)
     verdict = judge(x, wide, set_b)
     e = verdict.encounters
     assert e["cpa_range"] == pytest.approx(900.0)
     assert verdict.parts["s_range"][0] == pytest.approx(0.8)
     assert verdict.scores["safety"][0] == pytest.approx(0.9)
-    assert verdict.why(0).count(":") == 0  # their reasons are not put into words
+    assert ":" not in verdict.why(0)  # their reasons are not put into words
