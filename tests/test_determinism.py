@@ -191,12 +191,14 @@ def test_inactive_slots_change_no_bit(monkeypatch):
     large = started(1, source=CROWD)
     # slots in use on an axis of this length: of vessels or of obstacles, and of sources
     used = {n: [0, 1, 2] for n in (8, 16, 20, 40)} | {8 + 16: [0, 1, 2, 8, 9, 10], 20 + 40: [0, 1, 2, 20, 21, 22]}
+    # and of the picture, with its stretches of coast
+    used |= {n + 8: [*used[n], *range(n, n + 8)] for n in (8 + 16, 20 + 40)}
     tracked = np.zeros(20 + 40, bool)
     for now in given:
         roll(small, [now]), roll(large, [now])
         assert small.obs.tobytes() == large.obs.tobytes()
         assert small.terms.tobytes() == large.terms.tobytes()
-        tracked |= large.worlds["picture"]["id"][0, 0] > 0
+        tracked |= large.worlds["picture"]["id"][0, 0, : 20 + 40] > 0
     assert np.flatnonzero(tracked).tolist() == [1, 2, 20, 21, 22]
     for group in ("vessels", "routes", "obstacles", "plants", "weather", "safety", "nav", "ais", "tracks", "picture"):
         for name in small.worlds[group].dtype.names:

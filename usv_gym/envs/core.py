@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..config import ConfigError, Document, validate
 from ..scenarios.build import build_worlds, track_pool, write_weather
 from ..scenarios.families import FAMILIES
+from ..scenarios.land import scenario_coast
 from ..scenarios.loader import Source, load_scenario
 from ..scenarios.schema import Scenario, Weather
 from ..tasks.step import BEGIN, STEP, observe_batch, run_batch
@@ -34,7 +35,7 @@ from ..tasks.task import (
 )
 from ..units import DEG
 from ..world.disturbance import set_weather
-from ..world.land import NO_LAND
+from ..world.land import Coast, land_pool
 from ..world.state import A, capacity
 from ..world.vessel import VesselModel, load_vessel
 from .threads import Crew
@@ -82,7 +83,8 @@ class Core:
     """
 
     worlds: NDArray[Any]
-    land: NDArray[np.float64]  #: pool of the worlds' land (world/land.py)
+    coasts: tuple[Coast, ...]  #: what the worlds' ``land_id`` count in
+    land: NDArray[np.float64]  #: the same, indexed (world/land.py)
     tracks: NDArray[np.float64]  #: pool of the worlds' recorded tracks (traffic/replay.py)
     task: NDArray[Any]
     action_space: gym.Space[Any]
@@ -113,9 +115,9 @@ class Core:
         if difficulty is None:
             difficulty = self.scenario.family.difficulty if self.scenario.family else 0.5
         self.difficulty = np.full(num, check_difficulty(difficulty))  # [B]
-        self.observation_space = observation_space(config)
+        self.observation_space = observation_space(self.config)
         # one observer per world; the kernel knows of more
-        self._obs = np.zeros((num, 1, observation_size(config)), np.float32)
+        self._obs = np.zeros((num, 1, observation_size(self.config)), np.float32)
         self._episodes = np.zeros((num, 1), episode_dtype())
         self._name_views()
 
@@ -152,11 +154,22 @@ class Core:
             max(family.vessels, 1 + len(scenario.ships)),
             max(family.obstacles, len(scenario.obstacles)) + len(scenario.phantoms()),
         )  # fmt: skip
+        coast = scenario_coast(scenario, model)
+        coasts = (coast,) if coast else ()
+        if config.land is None:
+            config = config.model_copy(update={"land": bool(coasts)})
+        if hasattr(self, "_obs") and observation_size(config) != self._obs.shape[-1]:
+            raise ConfigError(
+                f"scenario {scenario.name!r} has {'' if coasts else 'no '}land, so its observation has another size; make the "
+                "environment with land=True or land=False, which fit every scenario"
+            )
         worlds, names = build_worlds(scenario, self.num, capacity=slots)
+        if coasts:
+            worlds["land_id"], worlds["chart_id"] = 0, 0 if scenario.land is None or scenario.land.chart else -1
         # nothing is changed until all of it is known to be right
         self.source, self.vessel, self.scenario, self.model, self._family = source, vessel, scenario, model, family
         self.worlds, self.names, self.action_space, self.config = worlds, names, space, config
-        self.land = NO_LAND
+        self.coasts, self.land = coasts, land_pool(coasts)
         self.tracks = track_pool(scenario)
         self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation

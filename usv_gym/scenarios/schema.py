@@ -30,6 +30,7 @@ from ..world.vessel import KinematicModel
 from .behaviours import Behaviour, Hostile, Waypoints
 from .events import Event, Shower, check_targets, phantoms
 from .family_schema import AnyFamily
+from .land_schema import Land
 from .places import Direction, GeoPoint, Name, Origin, Position
 from .sensor_schema import Flag, NonNegative, Number, Positive, Sensors, SensorsInput, Share, expand_sensors
 from .tracks import TrackError, check, nested, read_tracks
@@ -356,6 +357,7 @@ class Scenario(Model):
     origin: Origin = Origin(latitude_deg=59.4377744115633, longitude_deg=10.4716511800410)
     simulation: Simulation = Simulation()
     weather: Weather = Weather()
+    land: Land | None = None
     own_ship: OwnShip = Field(default_factory=OwnShip)
     ships: Annotated[dict[Name, Ship], BeforeValidator(_read_tracks)] = Field(default_factory=dict)
     obstacles: dict[Name, Obstacle] = Field(default_factory=dict)

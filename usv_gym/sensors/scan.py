@@ -1,6 +1,6 @@
 """Radar and LiDAR: one scan of an observer measures position and size of all it can see.
 
-Seen is what lies within range, beyond the minimum range, not in the shadow of something nearer, and is detected:
+Seen is what lies within range, beyond the minimum range, not in the shadow of something nearer or of land, and is detected:
 P_d = detection * a^2 / (a^2 + detection_radius^2) for the half-width a that the source shows.  A measurement is relative to
 the own ship and is reported at the own ship's *measured* position.  Its error is f(d) (b + v), f(d) = k d, with a slowly
 drifting bias b and white noise v (thesis 2.4-2.5); the bias is discretised exactly.
@@ -14,6 +14,7 @@ from .. import rng
 from ..jit import inner, spliced
 from ..world.state import LIDAR, RADAR
 from .clutter import false_alarms
+from .coastline import deliver_land, echo_land, hide_behind_land
 from .noise import pair_slot
 from .shadow import apparent_half_width, cast_shadows, look_around
 from .tdm import take_scan
@@ -26,6 +27,7 @@ def deliver(w, o, k, tick):
     if t.scan_due[o, k] < 0 or t.scan_due[o, k] > tick:
         return
     t.scan_due[o, k] = -1
+    deliver_land(w, o, k)
     for s in range(t.id.shape[1]):
         if t.measured_us[o, k, s] == t.scan_us[o, k]:
             if k == RADAR - 1:
@@ -43,7 +45,7 @@ def _decay(bias, bias_time, seconds):
 
 @inner
 def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection,
-          clutter, stream_clutter):
+          stream_land, clutter, stream_clutter):
     t = w.tracks
     own = w.observer[o]
     S = t.id.shape[1]
@@ -53,6 +55,7 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
         return
     count = look_around(w, own, reach)
     cast_shadows(w, count)
+    hide_behind_land(w, land, own, count)
     V = w.vessels.active.shape[0]
     now = tick * w.dt_us
     before = now + 1  # when the last source's bias was drawn: nearly all were in the same scan
@@ -103,6 +106,7 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
         # the controller's side knows the measured range only
         t.measured[o, k, s, 3] = max(sensor.gain * math.hypot(dn, de), sensor.gain_floor)
         t.measured_us[o, k, s] = now
+    echo_land(w, land, o, k, sensor, reach, tick, count, stream_land, stream_land + 1)
     if w.clutter:
         false_alarms(w, o, k, sensor, reach, clutter, tick, stream_clutter)
     t.scan_us[o, k] = now
@@ -114,7 +118,7 @@ def scan_radar(w, land, o, tick):
     """One revolution of the radar of observer o."""
     p = w.sensors.radar
     _scan(w, land, o, RADAR - 1, p, p.range * w.weather.radar_range_factor, tick,
-          rng.RADAR_BIAS, rng.RADAR_NOISE, rng.RADAR_DETECTION,
+          rng.RADAR_BIAS, rng.RADAR_NOISE, rng.RADAR_DETECTION, rng.RADAR_LAND,
           p.false_alarms + w.weather.radar_clutter, rng.RADAR_CLUTTER)  # fmt: skip
 
 
@@ -123,5 +127,5 @@ def scan_lidar(w, land, o, tick):
     """One sweep of the LiDAR of observer o."""
     p = w.sensors.lidar
     _scan(w, land, o, LIDAR - 1, p, p.range * w.weather.lidar_range_factor, tick,
-          rng.LIDAR_BIAS, rng.LIDAR_NOISE, rng.LIDAR_DETECTION,
+          rng.LIDAR_BIAS, rng.LIDAR_NOISE, rng.LIDAR_DETECTION, rng.LIDAR_LAND,
           p.false_alarms + w.weather.lidar_clutter, rng.LIDAR_CLUTTER)  # fmt: skip

@@ -27,6 +27,7 @@ from ..world.state import (
     RADAR,
 )
 from .ais import ais_class, reporting_interval_us
+from .coastline import publish_land
 from .ekf import init_scan_motion, init_size, predict_size, update_size
 from .fusion import fuse, fuse_size
 from .tracker import MOVING, predicted, track_ais, track_scan
@@ -210,5 +211,6 @@ def publish(w, land, o, tick):
             pic.cog[o, s] = pic.sog[o, s] = pic.rot[o, s] = math.nan
             pic.covariance[o, s, 3] = pic.covariance[o, s, 4] = math.nan
     pic.count[o] = count
+    publish_land(w, land, o, tick)
     pic.tick[o] = tick
     pic.sequence[o] += 1

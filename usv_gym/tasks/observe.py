@@ -10,7 +10,8 @@ import math
 from ..jit import inner
 from ..sensors.ais import ais_class
 from ..trig import PI, TWO_PI, atan2, clip, sincos, wrap
-from ..world.state import AIS_ATON, DESCRIPTOR_VESSEL
+from ..world.shore import coast, nearest_land
+from ..world.state import AIS_ATON, DESCRIPTOR_VESSEL, L
 from .task import N_OWN, N_TARGET, OBS_AIS, OBS_SECTORS, OBS_TRACKS, OBS_TRUTH
 
 
@@ -110,8 +111,10 @@ def observe(w, land, o, task, obs):
                     nav.leg[o], obs)  # fmt: skip
     sectors = task.observation == OBS_SECTORS
     if sectors:
-        for i in range(N_OWN, task.size):
+        for i in range(N_OWN, N_OWN + task.sectors):
             obs[i] = 0.0
+    if w.land_id >= 0 or w.chart_id >= 0 or task.land > 0:
+        _observe_land(w, land, o, task, north, east, heading, obs)
     hs, hc = sincos(heading)
     lag = (w.tick - pic.tick[o]) * w.dt
     found = 0
@@ -142,7 +145,9 @@ def observe(w, land, o, task, obs):
                 radius = w.obstacles.radius[s - V]
         distance = math.hypot(dn, de)
         if sectors:
-            _shade_sectors(task, obs, wrap(atan2(de, dn) - heading), distance, radius)
+            half = PI if distance <= radius else math.asin(radius / distance)
+            gap = max(distance - radius, 0.0)
+            _shade_sectors(obs, N_OWN, task.sectors, wrap(atan2(de, dn) - heading), half, 1.0 - gap / task.range_scale)
         else:
             found = _keep_nearest(w, found, s, distance - radius, task.targets)
     if sectors:
@@ -185,14 +190,50 @@ def observe(w, land, o, task, obs):
 
 
 @inner
-def _shade_sectors(task, obs, bearing, distance, radius):
-    """Closeness 1 - range / scale of a disc in every bearing sector that it touches; sector 0 starts at the bow."""
-    n = task.sectors
+def _shade_sectors(obs, start, n, bearing, half, closeness):
+    """Write closeness 1 - range / scale into those of n sectors, from obs[start] on, that the arc bearing +- half touches.
+
+    Sector 0 starts at the bow.
+    """
     width = TWO_PI / n
-    half = PI if distance <= radius else math.asin(radius / distance)
-    closeness = clip(1.0 - max(distance - radius, 0.0) / task.range_scale, 0.0, 1.0)
+    closeness = clip(closeness, 0.0, 1.0)
     first = math.floor((bearing - half) / width)
     last = math.floor((bearing + half) / width)
     for i in range(first, min(last, first + n - 1) + 1):
-        at = N_OWN + (i + 10 * n) % n
+        at = start + (i + 10 * n) % n
         obs[at] = max(obs[at], closeness)
+
+
+@inner
+def _observe_land(w, land, o, task, north, east, heading, obs):
+    """The part ``land`` at the end of the observation, echoes and then chart; echoes also in ``sectors``.
+
+    Each point that the picture holds fills the width that its sector had.
+    """
+    pic = w.picture
+    if task.observation == OBS_TRUTH:
+        # nobody paints a picture then, so there is room for what is true
+        for chart in range(2):
+            h = coast(land, w.chart_id if chart else w.land_id)
+            points = pic.chart[o] if chart else pic.land[o]
+            if h != 0:
+                nearest_land(land, h, north, east, task.range_scale, points)
+                for i in range(L):
+                    points[i, 0] += north
+                    points[i, 1] += east
+    n = task.land
+    start = task.size - 2 * n
+    for i in range(start, task.size):
+        obs[i] = 0.0
+    half = PI / L
+    for chart in range(2):
+        points = pic.chart[o] if chart else pic.land[o]
+        for i in range(L):
+            dn, de = points[i, 0] - north, points[i, 1] - east
+            distance = math.hypot(dn, de)
+            if distance == distance:
+                bearing, closeness = wrap(atan2(de, dn) - heading), 1.0 - distance / task.range_scale
+                if n > 0:
+                    _shade_sectors(obs, start + chart * n, n, bearing, half, closeness)
+                if chart == 0 and task.observation == OBS_SECTORS:
+                    _shade_sectors(obs, N_OWN, task.sectors, bearing, half, closeness)

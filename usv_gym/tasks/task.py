@@ -17,7 +17,7 @@ from pydantic import Field
 
 from ..colregs.params import Params, params_dtype
 from ..config import ConfigError, Document, Model, validate
-from ..world.state import A
+from ..world.state import A, L
 
 ActionName = Literal["default", "throttle_nozzle", "thrusters", "actuators", "heading_speed", "discrete"]
 ObservationName = Literal["tracks", "ais", "sectors", "truth"]
@@ -81,7 +81,9 @@ class TaskConfig(Model):
     observation: ObservationName = "tracks"
     targets: int = Field(default=8, ge=1, le=64)  #: K nearest targets in the observation
     sectors: int = Field(default=24, ge=4, le=360)  #: bearing sectors of ``sectors``
-    flat: bool = True  #: False: a Dict space of own, targets and mask (or sectors)
+    land: bool | None = None  #: whether the observation has the part ``land``; None: if the scenario has land
+    land_sectors: int = Field(default=36, ge=4, le=L)  #: bearing sectors of ``land``
+    flat: bool = True  #: False: a Dict space of own, targets and mask (or sectors), and land
     range_scale: float = Field(default=1852.0, gt=0)  #: [m]
     distance_scale: float = Field(default=1000.0, gt=0)  #: [m]
     cross_track_scale: float = Field(default=100.0, gt=0)  #: [m]
@@ -128,7 +130,7 @@ def task_dtype() -> np.dtype[Any]:
     """dtype of the task record that the kernel reads."""
     return np.dtype([
         ("action", "i1"), ("channels", "i2"), ("thruster", "i2", (3 * A,)), ("part", "i2", (3 * A,)),
-        ("observation", "i1"), ("targets", "i2"), ("sectors", "i2"), ("size", "i4"),
+        ("observation", "i1"), ("targets", "i2"), ("sectors", "i2"), ("land", "i2"), ("size", "i4"),
         ("control_ticks", "i8"), ("max_steps", "i8"), ("max_speed", "f8"),
         ("range_scale", "f8"), ("distance_scale", "f8"), ("cross_track_scale", "f8"), ("target_speed_scale", "f8"),
         ("radius_scale", "f8"), ("rate_scale", "f8"), ("safe_distance", "f8"),
@@ -202,6 +204,7 @@ def task_record(config: TaskConfig, vessel: Vessel, control_ticks: int, max_step
         row["channels"] = 1 if name == "discrete" else 2
     row["observation"] = _OBSERVATIONS[config.observation]
     row["size"] = observation_size(config)
+    row["land"] = config.land_sectors if config.land else 0
     row["control_ticks"] = control_ticks
     row["max_steps"] = max_steps
     row["max_speed"] = vessel.max_speed
@@ -217,6 +220,11 @@ def task_record(config: TaskConfig, vessel: Vessel, control_ticks: int, max_step
 
 def observation_size(config: TaskConfig) -> int:
     """Length of the flat observation."""
+    return _land_start(config) + (2 * config.land_sectors if config.land else 0)
+
+
+def _land_start(config: TaskConfig) -> int:
+    """Where the part ``land`` begins in the flat observation: behind own ship and targets or sectors."""
     return N_OWN + (config.sectors if config.observation == "sectors" else config.targets * N_TARGET)
 
 
@@ -230,32 +238,42 @@ def action_space(config: TaskConfig, vessel: Vessel) -> gym.Space[Any]:
 
 
 def observation_space(config: TaskConfig) -> gym.Space[Any]:
-    """Flat Box, or a Dict of ``own`` and ``targets`` with ``mask`` (or ``sectors``)."""
+    """Flat Box, or a Dict of ``own`` and ``targets`` with ``mask`` (or ``sectors``), and ``land``."""
     low = np.full(observation_size(config), -1.0, np.float32)
     high = np.ones(observation_size(config), np.float32)
     zero_to_one = (6, 11)
     low[list(zero_to_one)] = 0.0
+    land = _land_start(config)
+    low[land:] = 0.0
     if config.observation == "sectors":
         low[N_OWN:] = 0.0
     else:
-        grid = low[N_OWN:].reshape(config.targets, N_TARGET)
+        grid = low[N_OWN:land].reshape(config.targets, N_TARGET)
         grid[:, [0, 5, 6, 7, 8]] = 0.0
     if config.flat:
         return gym.spaces.Box(low, high, dtype=np.float32)
     spaces: dict[str, gym.Space[Any]] = {"own": gym.spaces.Box(low[:N_OWN], high[:N_OWN], dtype=np.float32)}
     if config.observation == "sectors":
-        spaces["sectors"] = gym.spaces.Box(low[N_OWN:], high[N_OWN:], dtype=np.float32)
+        spaces["sectors"] = gym.spaces.Box(low[N_OWN:land], high[N_OWN:land], dtype=np.float32)
     else:
-        shape = (config.targets, N_TARGET)
-        spaces["targets"] = gym.spaces.Box(low[N_OWN:].reshape(shape), high[N_OWN:].reshape(shape), dtype=np.float32)
+        least, most = (side[N_OWN:land].reshape(config.targets, N_TARGET) for side in (low, high))
+        spaces["targets"] = gym.spaces.Box(least, most, dtype=np.float32)
         spaces["mask"] = gym.spaces.MultiBinary(config.targets)
+    if config.land:
+        spaces["land"] = gym.spaces.Box(0.0, 1.0, (2, config.land_sectors), np.float32)
     return gym.spaces.Dict(spaces)
 
 
 def unflatten(config: TaskConfig, flat: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
     """The Dict form of flat observations [..., n]."""
-    own, rest = flat[..., :N_OWN].copy(), flat[..., N_OWN:]
+    start = _land_start(config)
+    own, rest = flat[..., :N_OWN].copy(), flat[..., N_OWN:start]
+    parts = {"own": own}
     if config.observation == "sectors":
-        return {"own": own, "sectors": rest.copy()}
-    targets = rest.reshape(*rest.shape[:-1], config.targets, N_TARGET).copy()
-    return {"own": own, "targets": targets, "mask": targets[..., 0].astype(np.int8)}
+        parts["sectors"] = rest.copy()
+    else:
+        targets = rest.reshape(*rest.shape[:-1], config.targets, N_TARGET).copy()
+        parts |= {"targets": targets, "mask": targets[..., 0].astype(np.int8)}
+    if config.land:
+        parts["land"] = flat[..., start:].reshape(*flat.shape[:-1], 2, config.land_sectors).copy()
+    return parts

@@ -12,6 +12,7 @@ import math
 from ..jit import inner
 from ..trig import sincos
 from .geometry import CLOSE, CONTACT_STEP, far_distance, hull_hull, hull_vertices, point_hull
+from .shore import coast, hull_land
 
 
 @inner
@@ -99,14 +100,42 @@ def _note(safety, o, s, near, end):
 
 
 @inner
+def _pass_land(w, h, land, o, j):
+    """Distances of vessel j from the coast of block h over the frame, followed as above where land is near."""
+    v, safety = w.vessels, w.safety
+    n, e, p = v.frame_eta[j, 0], v.frame_eta[j, 1], v.frame_eta[j, 2]
+    dn, de, dp = v.eta[j, 0] - n, v.eta[j, 1] - e, v.eta[j, 2] - p
+    length, beam = v.length[j], v.beam[j]
+    reach = 0.5 * math.hypot(length, beam)
+    closing = math.hypot(dn, de) + abs(dp) * reach + 1.0e-9
+    exact = CLOSE + closing
+    hull_vertices(w.hull[0], n + dn, e + de, p + dp, length, beam)
+    end = near = hull_land(land, h, w.hull[0], n + dn, e + de, reach, exact)
+    t = 0.0
+    while t < 1.0 and near > 0.0 and end < exact:
+        hull_vertices(w.hull[0], n + t * dn, e + t * de, p + t * dp, length, beam)
+        d = hull_land(land, h, w.hull[0], n + t * dn, e + t * de, reach, exact)
+        near = min(near, d)
+        t += max((d - near) / closing, 0.1 * d / closing, CONTACT_STEP / closing)
+    safety.land_distance[o] = end
+    safety.land_closest[o] = min(safety.land_closest[o], near)
+    safety.step_closest[o] = min(safety.step_closest[o], near)
+    if near <= 0.0:
+        safety.grounded[o] = 1
+
+
+@inner
 def sweep(w, land):
     """Distances of every observer's hull to every source, and to land, over the frame that ends now."""
     v, m, safety = w.vessels, w.obstacles, w.safety
     V = v.active.shape[0]
+    h = coast(land, w.land_id)
     for o in range(w.observer.shape[0]):
         j = w.observer[o]
         if v.active[j] == 0:
             continue
+        if h != 0:
+            _pass_land(w, h, land, o, j)
         n1, e1 = v.frame_eta[j, 0], v.frame_eta[j, 1]
         dn1, de1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1
         l1, b1 = v.length[j], v.beam[j]
