@@ -163,6 +163,7 @@ class Live:
         """The picture."""
         status = (self.name, self.mission.policy, f"seed {self.mission.seed}")
         return scene_from_snapshot(self._record(), self.voyage.commands.names, self.history, half_width=half_width,
+                                   coast=self.voyage.core.coast(0),
                                    status=tuple(s for s in status if s), extra=extra)  # fmt: skip
 
 

@@ -136,7 +136,7 @@ class Voyage:
                 core.actions[0] = demand
             else:
                 flat = core.obs[0]
-                core.actions[0] = self.controller.act(flat.copy() if self.config.flat else unflatten(self.config, flat))
+                core.actions[0] = self.controller.act(flat.copy() if self.config.flat else unflatten(core.config, flat))
             self.recorder.action(core.actions[0])
             core.step()
         self.step_count += 1
@@ -160,5 +160,6 @@ class Voyage:
             control_interval=core.control_interval,
             outcome={"outcome": self.outcome or "interrupted", "closest_m": float(core.episodes["closest"][0])},
             task=core.config.dump(),
+            land=[[ring.round(2) for ring in polygon.rings] for polygon in core.coast(0)],
             orders=[[tick, command, arguments] for tick, command, arguments in self.commands.log],
         )

@@ -7,6 +7,8 @@ import gymnasium as gym
 #: id -> what it is, and the scenario that it draws its seas from; None: ``scenario=`` is an argument
 ENVIRONMENTS: dict[str, tuple[str, str | None]] = {
     "usv_gym/OpenSea-v0": ("a new random open sea at every reset: a route, icebergs, crossing ships, weather", "open_sea"),
+    "usv_gym/NearShore-v0": ("narrow waters: land to both sides, islands, unpredictable leisure boats", "near_shore"),
+    "usv_gym/BusyPort-v0": ("a port: fairway, quays, moored and moving vessels, ferries", "busy_port"),
     "usv_gym/Encounter-v0": ("ships on collision courses, by class of encounter, distance and time of the CPA", "encounter"),
     "usv_gym/Imazu-v0": ("one of the 22 cases of Imazu at every reset, or case= one of them", "imazu"),
     "usv_gym/Scenario-v0": ("a scenario by name, file or mapping", None),

@@ -154,8 +154,12 @@ class Core:
             max(family.vessels, 1 + len(scenario.ships)),
             max(family.obstacles, len(scenario.obstacles)) + len(scenario.phantoms()),
         )  # fmt: skip
-        coast = scenario_coast(scenario, model)
-        coasts = (coast,) if coast else ()
+        coasts = family.coasts() if family else ()
+        if scenario.land is not None:
+            if scenario.family and coasts:
+                raise ConfigError(f"scenario {scenario.name!r}: land: the family {scenario.family.name!r} has its own")
+            coast = scenario_coast(scenario, model)
+            coasts = (coast,) if coast else ()
         if config.land is None:
             config = config.model_copy(update={"land": bool(coasts)})
         if hasattr(self, "_obs") and observation_size(config) != self._obs.shape[-1]:
@@ -164,8 +168,8 @@ class Core:
                 "environment with land=True or land=False, which fit every scenario"
             )
         worlds, names = build_worlds(scenario, self.num, capacity=slots)
-        if coasts:
-            worlds["land_id"], worlds["chart_id"] = 0, 0 if scenario.land is None or scenario.land.chart else -1
+        if scenario.land is not None and coasts:
+            worlds["land_id"], worlds["chart_id"] = 0, 0 if scenario.land.chart else -1
         # nothing is changed until all of it is known to be right
         self.source, self.vessel, self.scenario, self.model, self._family = source, vessel, scenario, model, family
         self.worlds, self.names, self.action_space, self.config = worlds, names, space, config
@@ -187,6 +191,11 @@ class Core:
     def _bytes(self) -> NDArray[np.uint8]:
         """The worlds as bytes [B, n]: a view."""
         return self.worlds.view(np.uint8).reshape(self.num, -1)
+
+    def coast(self, b: int) -> Coast:
+        """The land of row b."""
+        k = int(self.worlds["land_id"][b])
+        return self.coasts[k] if k >= 0 else ()
 
     def ids(self, b: int) -> list[str]:
         """Ids of the sources of row b [S], "" where a slot is empty; what a family drew is called ship_1, obstacle_1, ..."""
@@ -312,6 +321,7 @@ class Core:
             "control_interval": self.control_interval,
             "channels": self.actions.shape[1],
             "targets": config.targets,
+            "land": config.land_sectors if config.land else 0,
             **{name: getattr(config, name) for name in (
                 "range_scale", "distance_scale", "cross_track_scale", "target_speed_scale", "radius_scale", "rate_scale")},
         }  # fmt: skip

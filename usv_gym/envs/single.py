@@ -197,7 +197,7 @@ class USVEnv(gym.Env[Any, Any]):
         if self._history is None:
             self._history = History()
         names = self._commands.names if self._commands else self.core.ids(0)
-        scene = scene_from_snapshot(self.core.worlds[0], names, self._history)
+        scene = scene_from_snapshot(self.core.worlds[0], names, self._history, coast=self.core.coast(0))
         if self.render_mode == "rgb_array":
             from ..render.pygame_view import render
 

@@ -111,7 +111,8 @@ class Row:
         if self._history is None:
             self._history = History()
         names = self._commands.names if self._commands else self._env.core.ids(self._b)
-        return render(scene_from_snapshot(self.world, names, self._history), size=(800, 800))
+        scene = scene_from_snapshot(self.world, names, self._history, coast=self._env.core.coast(self._b))
+        return render(scene, size=(800, 800))
 
 
 class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):

@@ -269,7 +269,7 @@ class Signals:
             dcpa, tcpa = cpa(north - n0, east - e0, vn - vn0, ve - ve0)
             descriptor, id = int(p["descriptor"][0, s]), int(p["id"][0, s])
             targets.append({
-                "id": id, "descriptor": descriptor, "descriptor_text": "vessel" if descriptor == 1 else "fixed_obstacle",
+                "id": id, "descriptor": descriptor, "descriptor_text": ("fixed_obstacle", "vessel", "land")[descriptor],
                 "sensors": int(p["sensors"][0, s]), "motion_known": bool(p["motion_known"][0, s]),
                 "latitude": latitude, "longitude": longitude, "north": north, "east": east,
                 "enu_covariance": [float(c[2]), float(c[1]), float(c[1]), float(c[0])],

@@ -38,7 +38,7 @@ class Tuning:
 def _decide(obs, mask, ship_, tuning_, states, actions):
     ship, k = ship_[0], tuning_[0]
     own = np.zeros(1, OWN)[0]
-    targets = np.zeros(ship.targets, TARGET)
+    targets = np.zeros(ship.targets + ship.land, TARGET)
     for b in range(obs.shape[0]):
         if not mask[b]:
             continue

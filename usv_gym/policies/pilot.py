@@ -29,7 +29,8 @@ LOOKOUT = TaskConfig(
 
 #: facts of the vessel and of the observation
 SHIP = np.dtype([
-    ("targets", "i8"), ("max_speed", "f8"), ("cruise", "f8"), ("length", "f8"), ("dt", "f8"),
+    ("targets", "i8"), ("land", "i8"),  # how many; sectors of land, 0: not observed
+    ("max_speed", "f8"), ("cruise", "f8"), ("length", "f8"), ("dt", "f8"),
     ("range_scale", "f8"), ("distance_scale", "f8"), ("target_speed_scale", "f8"), ("radius_scale", "f8"),
     ("rate_scale", "f8"),
     ("lookahead", "f8"), ("sigma", "f8"),  # of the line of sight: [m], integral's weight [m/s]
@@ -57,13 +58,14 @@ STATE = np.dtype([
     ("waited", "f8"),  # [s] for which it has been turned away from where it wants to go
 ], align=True)  # fmt: skip
 
+LAND_TIME = 60.0  #: [s] of cruising within which land is looked at
 MOVING = 0.7  #: [m/s] what makes a target one that the steering rules are about
 SIGMA = 0.2  # weight of the integral, as a share of the cruising speed; 0.25 is critically damped
 
 
 @inner
 def look(obs, ship, own, targets):
-    """Read an observation [n] into ``own`` and ``targets`` [>= K]; returns how many targets there are.
+    """Read an observation [n] into ``own`` and ``targets`` [>= K + sectors of land]; returns how many targets there are.
 
     Everything that has to be kept clear of becomes a disc in ``targets``, ships, icebergs and shores alike.
     """
@@ -89,6 +91,30 @@ def look(obs, ship, own, targets):
         t.distance = math.hypot(t.x, t.y)
         t.radius = (obs[at + 6] + obs[at + 7]) * ship.radius_scale
         t.moves = 1 if t.speed > MOVING else 0
+        found += 1
+    return _look_for_land(obs, ship, targets, found)
+
+
+@inner
+def _look_for_land(obs, ship, targets, found):
+    """Add a disc for the land in every sector that is near, echoed or charted, whichever is nearer; returns the new count.
+
+    The disc touches both sides of its sector, and its near side is where the land is.
+    """
+    n = ship.land
+    start = N_OWN + ship.targets * N_TARGET
+    width = math.sin(PI / max(n, 1))
+    for i in range(n):
+        r = (1.0 - max(obs[start + i], obs[start + n + i])) * ship.range_scale
+        if r > LAND_TIME * ship.cruise:
+            continue
+        t = targets[found]
+        t.radius = r * width / (1.0 - width)
+        t.distance = r + t.radius
+        s, c = sincos((i + 0.5) * 2.0 * PI / n)
+        t.x, t.y = t.distance * c, t.distance * s
+        t.vx = t.vy = t.speed = 0.0
+        t.moves = 0
         found += 1
     return found
 
@@ -182,7 +208,8 @@ class Pilot:
     def act(self, observation: Any) -> NDArray[np.float32]:
         """The action for one observation: flat, or its Dict form."""
         if isinstance(observation, Mapping):
-            observation = np.concatenate([observation["own"], np.ravel(observation["targets"])])
+            parts = [np.ravel(observation[name]) for name in ("own", "targets", "land") if name in observation]
+            observation = np.concatenate(parts)
         action: NDArray[np.float32] = self.act_batch(np.asarray(observation, np.float32)[None])[0].copy()
         return action
 

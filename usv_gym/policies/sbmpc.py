@@ -156,7 +156,7 @@ def _hazard(path, own, ship, k, targets, found, enough):
 def _decide(obs, mask, ship_, tuning_, states, actions):
     ship, k = ship_[0], tuning_[0]
     own = np.zeros(1, OWN)[0]
-    targets = np.zeros(ship.targets, TARGET)
+    targets = np.zeros(ship.targets + ship.land, TARGET)
     path = np.zeros((_STEPS, 4))
     for b in range(obs.shape[0]):
         if not mask[b]:

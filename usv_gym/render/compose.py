@@ -52,6 +52,8 @@ def compose(
     """
     layers: Layers = {name: [] for name in LAYERS}
     _shadows(layers["shadows"], sea)
+    for shell, *holes in sea.land:
+        layers["land"] += [Polygon(shell, "land"), *(Polygon(hole, "lake") for hole in holes)]
     _rings(layers, sea, extent)
     for j, trail in sorted(trails.items()):
         _trail(layers, trail, own=j == sea.own)

@@ -83,6 +83,8 @@ STYLES: dict[str, Style] = {
     "vector":         _style("- #1f8a55",         "- #3ed08a",         "- #83702c", 1.4),
     "iceberg":        _style("#ffffff #5b7f98",   "#dbe9f2 #8fb0c6",   "#57443a #8d6a56", 1.1),
     "iceberg_shade":  _style("#bcd5e6 -",         "#7fa0b8 -",         "#38291f -"),
+    "land":           _style("#e2d3a6 #6b5f3c",   "#4a4632 #b5a878",   "#2b1d10 #6a4e2c", 1.3),
+    "lake":           _style("#c9e1ea #6b5f3c",   "#20303a #b5a878",   "#17100d #6a4e2c", 1.0),
     "islet":          _style("#c9ba79 #4d4426",   "#95824c #d8c88f",   "#4a3618 #86683a", 1.2),
     "islet_shade":    _style("#a9985a -",         "#6f6035 -",         "#33240f -"),
     "buoy":           _style("#f2c230 #12181c",   "#f2c230 #fff3c4",   "#8a6420 #c09048", 1.1),

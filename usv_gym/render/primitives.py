@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
 
-#: drawing order, bottom first; ``land`` waits for charts
+#: drawing order, bottom first
 LAYERS = (
     "shadows", "land", "rings", "tracks", "route", "detections", "obstacles", "vessels", "symbols", "own", "labels"
 )  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..world.land import Coast
 from .compose import compose
 from .panel import panel, plots
 from .primitives import Primitive, Scene
@@ -26,6 +27,7 @@ def scene_from_snapshot(
     status: Sequence[str] = (),
     hide: Sequence[str] = (),
     extra: Mapping[str, Sequence[Primitive]] | None = None,
+    coast: Coast = (),
 ) -> Scene:
     """Scene of a live world, centred on the own ship.
 
@@ -47,8 +49,10 @@ def scene_from_snapshot(
         names of layers to leave out, see `usv_gym.render.primitives.LAYERS`.
     extra
         more primitives by layer, drawn over those of the same layer.
+    coast
+        the land of the world (`Core.coast`).
     """
-    sea = sea_from_record(world, names, observer)
+    sea = sea_from_record(world, names, observer, coast)
     curves = None
     if trails is not None:
         trails.push(sea)
@@ -65,7 +69,7 @@ def scene_from_snapshot(
     )
 
 
-def sea_from_record(world: Any, names: Sequence[str] = (), observer: int = 0) -> Sea:
+def sea_from_record(world: Any, names: Sequence[str] = (), observer: int = 0, coast: Coast = ()) -> Sea:
     """What one observer's map shows of a world record; the arrays are copies."""
     v, m, routes = world["vessels"], world["obstacles"], world["routes"]
     own = int(world["observer"][observer])
@@ -91,6 +95,7 @@ def sea_from_record(world: Any, names: Sequence[str] = (), observer: int = 0) ->
         radar_range=_range(world, "radar"),
         lidar_range=_range(world, "lidar"),
         thrust=_thrust(world["plants"], int(v["plant"][own])),
+        land=[polygon.rings for polygon in coast],
     )
 
 

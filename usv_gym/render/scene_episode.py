@@ -124,6 +124,7 @@ def sea_from_episode(episode: Episode, i: int, t: float = 0.0) -> Sea:
         radar_range=_range(sensors, "radar"),
         lidar_range=_range(sensors, "lidar"),
         thrust=sides(command, np.asarray(thruster_y)) if thruster_y else (),
+        land=[[np.array(ring, dtype=np.float64) for ring in rings] for rings in meta.get("land") or ()],
     )
 
 

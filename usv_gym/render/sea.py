@@ -88,6 +88,7 @@ class Sea:
     acceptance: float = 0.0  # [m]
     radar_range: float = 0.0  # [m], 0: no such sensor
     lidar_range: float = 0.0
+    land: Sequence[Sequence[Points]] = ()  # of each polygon the shell [n, 2] and its holes
     thrust: tuple[float, ...] = ()  # demand in [-1, 1]: port and starboard, or one for all
 
     @property

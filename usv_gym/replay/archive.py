@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..world.state import MODEL_3DOF, A
+from ..world.state import T as T_LAND  # stretches of coast: here T is the number of samples
 
 FORMAT = "usv-episode"
 VERSION = 1
@@ -123,7 +124,9 @@ class Episode:
         return int(self.meta["own"])
 
     def name(self, source: int) -> str:
-        """Name of a source; ``source <n>`` where the scenario gave none."""
+        """Name of a source; ``source <n>`` where the scenario gave none, ``land <n>`` for a stretch of coast."""
+        if source >= self.sources:
+            return f"land {source - self.sources + 1}"
         names = self.meta.get("names", [])
         return str(names[source]) if 0 <= source < len(names) and names[source] else f"source {source}"
 
@@ -264,9 +267,9 @@ def _check(episode: Episode) -> None:
         raise ArchiveError("actions must be numbers")
     if T == 0 or np.any(np.diff(episode.t) <= 0):
         raise ArchiveError("t must hold at least one sample and increase")
-    for table in (episode.detections, episode.ais):
-        if np.any((table["source"] < 0) | (table["source"] >= V + M)):
-            raise ArchiveError(f"sources must lie in 0..{V + M - 1}")
+    for table, sources in ((episode.detections, V + M + T_LAND), (episode.ais, V + M)):
+        if np.any((table["source"] < 0) | (table["source"] >= sources)):
+            raise ArchiveError(f"sources must lie in 0..{sources - 1}")
     if not 0 <= episode.meta.get("own", -1) < V:
         raise ArchiveError(f"meta: own must be a vessel slot, 0..{V - 1}")
     for name, count in (("models", V), ("kinds", V + M), ("mmsi", V + M), ("ais_class", V + M)):

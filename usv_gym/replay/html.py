@@ -182,7 +182,8 @@ def _samples(episode: Episode, since: float, stride: int) -> Columns:
 
 
 def _detections(episode: Episode, since: float, thin: int) -> Columns:
-    table = episode.detections[episode.detections["t"] > since]
+    table = episode.detections
+    table = table[(table["t"] > since) & (table["source"] < episode.sources)]
     if thin > 1:
         times = np.unique(table["t"])[::thin]
         table = table[np.isin(table["t"], times)]

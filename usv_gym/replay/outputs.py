@@ -231,6 +231,8 @@ def _objects(episode: Episode) -> list[dict[str, Any]]:
 def _tdm(episode: Episode) -> dict[str, Any]:
     """Errors of the detected targets against the truth at the time of the report; false targets have none."""
     d, own = episode.detections, episode.own
+    land_count = int((d["source"] >= episode.sources).sum())
+    d = d[d["source"] < episode.sources]  # of a stretch of coast nobody can say which point should have been reported
     sample = np.clip(np.searchsorted(episode.t, d["t"], side="right") - 1, 0, len(episode.t) - 1)
     there = episode.active[sample, d["source"]]
     ever = np.asarray(episode.active.any(axis=0))
@@ -249,7 +251,7 @@ def _tdm(episode: Episode) -> dict[str, Any]:
     cog_error = angle_difference(d["cog"], np.arctan2(velocity[:, 1], velocity[:, 0]))[moving]
     return {
         "reports_count": len(np.unique(episode.detections["t"])),
-        "detections_count": len(episode.detections),
+        "detections_count": len(episode.detections), "land_detections_count": land_count,
         "false_detections_count": false_count,
         "position_error_by_range": [
             {

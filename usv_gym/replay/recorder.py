@@ -46,12 +46,14 @@ class Recorder:
     _tick_now: Array
     _traffic_now: Array
     _collided_now: Array
+    _grounded_now: Array
     _picture_now: Array
     _sent_now: Array
     _heard_now: Array
     _stage_now: Array
     # what was seen last
     _collided: int
+    _grounded: int
     _picture: int
     _sent: Array
     _heard: Array
@@ -94,6 +96,10 @@ class Recorder:
             self._collided = int(self._collided_now[0])
             if self._collided >= 0:
                 self.event(self._seconds(tick), "collision", self._collided, "")
+        if self._grounded_now[0] != self._grounded:
+            self._grounded = int(self._grounded_now[0])
+            if self._grounded:
+                self.event(self._seconds(tick), "grounding")
         if (self._stage_now != self._stage).any():
             self._happen()
         if self._picture_now[0] != self._picture:
@@ -176,7 +182,7 @@ class Recorder:
             self._samples = _Table(sample_dtype(V, M), 256)
             self._detections = _Table(DETECTION, 256)
             self._ais = _Table(AIS_REPORT, 256)
-            self._collided, self._picture = -1, 0
+            self._collided, self._grounded, self._picture = -1, 0, 0
             self._sent = np.zeros(V + M, np.int32)
             self._heard = np.zeros(V + M, np.int32)
             self._stage = np.zeros_like(worlds["events"]["state"][b])
@@ -187,6 +193,7 @@ class Recorder:
         self._tick_now = worlds["tick"][b : b + 1]
         self._traffic_now = worlds["traffic_tick"][b : b + 1]
         self._collided_now = worlds["safety"]["collided_with"][b]
+        self._grounded_now = worlds["safety"]["grounded"][b]
         self._picture_now = worlds["picture"]["sequence"][b]
         self._sent_now = worlds["ais"]["sequence"][b]
         self._heard_now = worlds["ais"]["received"][b, 0]

@@ -33,5 +33,6 @@ def trajectory_of(episode: Episode) -> Trajectory:
     hits = [event["id"] for event in episode.events if event["kind"] == "collision"]
     one.touched[0] = hits[0] if hits else -1
     one.aground[0] = one.touched[0] >= V and episode.meta["kinds"][one.touched[0]] == KIND_ISLET
+    one.aground[0] |= outcome.get("outcome") == "grounding"
     one.closest_obstacle[0] = 0.0 if one.touched[0] >= V else one.obstacle[0].min()
     return one

@@ -79,9 +79,25 @@ def _read(
         parts.append(_valid(f"scenario {name!r}: land.polygons.{k}", shapely.Polygon(rings[0], rings[1:]), False))
     square = [shapely.clip_by_rect(part, -radius, -radius, radius, radius) for part in parts]
     whole = shapely.union_all(square)
-    if land.simplify > 0.0:  # each part stays valid, but neighbours may come to overlap
-        whole = shapely.union_all(shapely.get_parts(shapely.simplify(whole, land.simplify)))
+    if land.simplify > 0.0:
+        whole = _simplified(whole, land.simplify)
     return whole, _polygons(whole)
+
+
+def _simplified(geometry: Any, tolerance: float) -> Any:
+    """A geometry with fewer corners; none of the old ones is farther from the new shore than ``tolerance`` [m]."""
+    import shapely
+
+    corners = shapely.points(shapely.get_coordinates(geometry))
+    step = tolerance
+    while True:
+        # each part stays valid, but neighbours may come to overlap
+        simple = shapely.union_all(shapely.get_parts(shapely.simplify(geometry, step)))
+        shore = shapely.boundary(simple)
+        shapely.prepare(shore)
+        if len(corners) == 0 or shapely.distance(shore, corners).max() <= tolerance:
+            return simple
+        step *= 0.7  # where it keeps apart what would touch, GEOS may go beyond
 
 
 def _place(place: tuple[float, float] | GeoPoint, local: Any) -> tuple[float, float]:

@@ -21,7 +21,7 @@ Block = NDArray[np.float64]  #: an indexed coast
 #: the pool of the open sea
 NO_LAND: NDArray[np.float64] = np.zeros(1)
 
-CELLS_PER_EDGE, FEWEST, MOST = 8.0, 16384, 131072  #: cells of an index
+CELLS_PER_EDGE, FEWEST, MOST = 16.0, 4096, 131072  #: cells of an index
 SMALLEST_SIDE = 10.0  #: [m] of a cell
 
 
