@@ -382,11 +382,11 @@ ROW = "265177000,2018-02-08T10:00:00,57.0,11.0,9.7,0.0,0\n"
 @pytest.mark.parametrize(("text", "arguments", "message"), [
     ("MMSI,BaseDateTime,LATT,LON\n1,2,3,4\n", [], "a.csv:1: no column for latitude (called latitude or lat)"),
     ("MMSI,BaseDateTime,Latitud,LON\n1,2,3,4\n", [], "did you mean 'Latitud'?; the header has: MMSI"),
-    ("a;b;c\n1;2;3\n", [], "no column for timestamp"),
+    ("a;b;c\n1;2;3\n", [], "a.csv:1: neither NMEA sentences nor a table of AIS: no columns for timestamp, mmsi"),
     (HEADER + "265177000,yesterday,57.0,11.0,9.7,0.0,0\n", [], "a.csv:2: column 'BaseDateTime': unreadable time 'yesterday'"),
     (HEADER + "265177000,2018-13-08T10:00:00,57.0,11.0,9.7,0.0,0\n", [], "unreadable time '2018-13-08T10:00:00'"),
     (HEADER, [], "no position reports of ships in 1 lines"),
-    ("", [], "a.csv:1: no column for timestamp"),
+    ("", [], "the first line has: nothing"),
     (HEADER + ROW, ["--area", "0,0,5km"], "no ships within 5000 m around 0, 0; the files hold fixes from 2018-02-08T10:00:00Z"),
     (HEADER + ROW, [], "no tracks within 5000 m around 57, 11: 1 ships reported only once"),
     (HEADER + ROW, ["--start", "2019-01-01"], "between 2019-01-01T00:00:00Z"),
@@ -398,8 +398,10 @@ ROW = "265177000,2018-02-08T10:00:00,57.0,11.0,9.7,0.0,0\n"
     (HEADER + ROW, ["--own", "265177001"], "--own 265177001: no positions of it"),
     (HEADER + ROW, ["--own", "no.csv"], "no.csv: no such file"),
     (HEADER + ROW, ["--behaviour", "colregs"], "--behaviour colregs: is for ships that left their track"),
+    (HEADER + ROW, ["--behaviour", "colreg", "--handover", "5"], "--behaviour colreg: unknown; did you mean 'colregs'?"),
+    (HEADER + ROW, ["--vessel", "oddin"], "unknown vessel 'oddin'; did you mean 'odin'?"),
     (HEADER + ROW, ["-o", "out.json"], "--out out.json: expected a file that ends in .yaml"),
-    ("\x00\x01\x02" * 99, [], "no column for timestamp"),
+    ("\x00\x01\x02" * 99, [], "neither NMEA sentences nor a table of AIS"),
 ])  # fmt: skip
 def test_bad_input_is_one_clear_line(tmp_path, monkeypatch, capsys, text, arguments, message):
     monkeypatch.chdir(tmp_path)
@@ -426,6 +428,13 @@ def test_broken_archives_and_missing_files_are_said(tmp_path):
                           ("two.zip", "expected one file in the archive, found 2")):  # fmt: skip
         with pytest.raises(ConfigError, match=message):
             import_ais(Request([tmp_path / name], area))
+
+
+def test_a_log_without_any_clock_is_said_to_be_one(data, tmp_path):
+    lines = [line.split(b"\\")[-1] for line in (data / CHANNEL_NMEA).read_bytes().splitlines()]
+    (tmp_path / "timeless.nmea").write_bytes(b"\n".join(lines))
+    with pytest.raises(ConfigError, match=r"timeless.nmea: no time for its 3,6\d\d position reports: expected tag blocks"):
+        import_ais(Request([tmp_path / "timeless.nmea"], parse_area("solent")))
 
 
 def test_unreadable_rows_are_counted_and_not_fatal(tmp_path):

@@ -66,6 +66,17 @@ def test_a_ship_sails_its_track_and_is_seen_only_where_there_is_one():
     assert worlds["replays"]["changes"][0, 1] == 3  # vanished, appeared, vanished
 
 
+def test_a_record_has_a_ship_where_it_is_at_the_start_before_the_kernel_runs():
+    earlier = [[[t - 30.0, *rest] for t, *rest in part] for part in CURVE]
+    scenario = load_scenario({"ships": {"now": {"track": earlier}, "later": {"track": CURVE[1]}}})
+    worlds, _ = build_worlds(scenario, capacity=(V, 16))
+    before = worlds["vessels"]["eta"][0, :3].copy()
+    assert worlds["vessels"]["active"][0, :3].tolist() == [1, 1, 0]
+    reset_worlds(worlds, NO_LAND, track_pool(scenario), np.ones(1, bool))
+    assert worlds["vessels"]["eta"][0, 1] == pytest.approx(before[1], abs=1e-6)
+    assert worlds["vessels"]["active"][0, :3].tolist() == [1, 1, 0]
+
+
 def test_course_and_speed_are_those_of_the_track():
     worlds, _, tracks, _ = sea()
     sail(worlds, tracks, 60.0)
@@ -128,6 +139,22 @@ def test_what_is_left_of_a_track_is_the_route_of_a_ship_that_was_handed_over(beh
     assert worlds["vessels"]["eta"][0, 1, :2] == pytest.approx([45.0, 500.0], abs=30.0)
     sail(worlds, tracks, 150.0)
     assert worlds["vessels"]["eta"][0, 1, 1] < 100.0
+
+
+def test_an_event_takes_a_ship_off_its_track_at_its_present_speed():
+    scenario = load_scenario({
+        "ships": {"ferry": {"length": 60.0, "track": CURVE}},
+        "events": [{"at": 60.0, "action": "change_behaviour", "target": "ferry", "behaviour": "waypoints"}],
+    })  # fmt: skip
+    worlds, _ = build_worlds(scenario, capacity=(V, 16))
+    tracks = track_pool(scenario)
+    reset_worlds(worlds, NO_LAND, tracks, np.ones(1, bool))
+    sail(worlds, tracks, 62.0)
+    assert worlds["vessels"]["behaviour"][0, 1] == 1
+    assert worlds["vessels"]["speed"][0, 1] == pytest.approx(6.0, abs=0.05)
+    assert worlds["routes"]["waypoint"][0, 1, 1] == pytest.approx([1500.0, 370.0])
+    sail(worlds, tracks, 60.0)
+    assert math.dist(worlds["vessels"]["eta"][0, 1, :2], (1500.0, 370.0)) < 60.0
 
 
 def test_notices_and_commands_know_replayed_ships():

@@ -56,7 +56,7 @@ def show(
         raise ConfigError(f"{target}: expected a file that ends in .png")
     scene = scene_of_start(
         core.worlds[0], core.ids(0), title=name, cruise=core.model.cruise_speed, duration=sea.simulation.duration,
-        status=(sea.own_ship.vessel_name, *([f"seed {seed}"] if sea.family else [])),
+        status=(sea.own_ship.vessel_name, *([f"seed {seed}"] if sea.family else [])), tracks=core.tracks,
     )  # fmt: skip
     try:
         save_png(scene, target, size=pixel_size, palette=palette)

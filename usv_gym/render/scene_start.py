@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..scenarios.tracks import along
 from ..units import DEG, KNOT, wrap_360
 from ..world.encounter import Encounter, encounters
 from ..world.state import AFTER_CONTINUE, AFTER_LOOP
@@ -67,6 +68,7 @@ def scene_of_start(
     duration: float = 600.0,
     status: Sequence[str] = (),
     hide: Sequence[str] = ("shadows",),
+    tracks: Points | None = None,
 ) -> Scene:
     """Scene of a world at its start.
 
@@ -86,11 +88,13 @@ def scene_of_start(
         texts beside the title, as the seed.
     hide
         names of layers to leave out.
+    tracks
+        pool of recorded tracks [n, 7], of a world with replayed ships.
     """
     sea = sea_from_record(world, names)
     own = _own_track(world, sea, cruise, duration)
     t = STEP * np.arange(len(own), dtype=np.float64)
-    meetings = [_meeting(world, sea, j, own, t) for j in sea.others() if j < sea.vessels]
+    meetings = [_meeting(world, sea, j, own, t, tracks) for j in sea.others() if j < sea.vessels]
     way = float(np.hypot(*np.diff(own, axis=0).T).sum())
     marked = [m for m in meetings if m.dcpa < max(ROUTE_SHARE * way, 100.0) and 0 < m.nearest < len(t) - 1]
     extent = _extent(sea, own, marked)
@@ -138,10 +142,15 @@ def _own_track(world: Any, sea: Sea, cruise: float, duration: float) -> Points:
     return _sail(points, speed, STEP * np.arange(math.floor(duration / STEP) + 2, dtype=np.float64), on)
 
 
-def _meeting(world: Any, sea: Sea, j: int, own: Points, t: Points) -> Meeting:
-    points, on = _ahead(world, j, np.array(sea.place(j)))
-    track = _sail(points, float(np.hypot(*sea.velocity[j])), t, on)
-    distance = np.hypot(*(track - own).T)
+def _meeting(world: Any, sea: Sea, j: int, own: Points, t: Points, tracks: Points | None) -> Meeting:
+    first, count = int(world["replays"]["first"][j]), int(world["replays"]["count"][j])
+    if tracks is not None and count:
+        track = along(tracks[first : first + count], t)
+        track[0] = sea.place(j)
+    else:
+        points, on = _ahead(world, j, np.array(sea.place(j)))
+        track = _sail(points, float(np.hypot(*sea.velocity[j])), t, on)
+    distance = np.nan_to_num(np.hypot(*(track - own).T), nan=np.inf)  # a replayed ship may not be there any more
     codes, d, when = np.zeros((1, 1), np.int64), np.zeros((1, 1)), np.zeros((1, 1))
     velocity = (own[1] - own[0]) / STEP  # of one who starts at rest, as it will be
     encounters(np.array([[*own[0], *velocity]]), np.array([[[*track[0], *sea.velocity[j]]]]), codes, d, when)
@@ -156,8 +165,8 @@ def _plan(own: Points, meetings: Sequence[Meeting], marked: Sequence[Meeting]) -
     symbols: list[Primitive] = []
     labels: list[Primitive] = []
     for m in meetings:
-        tracks.append(Polyline(m.track[: m.nearest + 1], "track_ship"))
-        tracks.append(Polyline(m.track[m.nearest :], "track_later"))
+        tracks.append(Polyline(_seen(m.track[: m.nearest + 1]), "track_ship"))
+        tracks.append(Polyline(_seen(m.track[m.nearest :]), "track_later"))
     # several closest points in one place are said in one label
     groups: list[list[Meeting]] = []
     near = 0.02 * float(np.ptp(own, axis=0).max())
@@ -178,9 +187,14 @@ def _plan(own: Points, meetings: Sequence[Meeting], marked: Sequence[Meeting]) -
     return {"tracks": tracks, "symbols": symbols, "labels": labels}
 
 
+def _seen(track: Points) -> Points:
+    """The places of a track at which there is a ship."""
+    return track[np.isfinite(track[:, 0])]
+
+
 def _free_side(own: Points, group: Sequence[Meeting]) -> Points:
     """Direction to the east [N, E] in which a text is crossed by none of the tracks of a closest point, if there is one."""
-    lines = [own[-1] - own[0], *(m.track[-1] - m.track[0] for m in group)]
+    lines = [own[-1] - own[0], *(_seen(m.track)[-1] - m.track[0] for m in group)]
     taken = np.array([math.atan2(line[1], line[0]) + turn for line in lines for turn in (0.0, math.pi)])
     sides = np.radians([55.0, 125.0, 90.0, 75.0, 105.0])
     free = np.abs(np.angle(np.exp(1j * (sides[:, None] - taken)))).min(axis=1)
@@ -228,6 +242,7 @@ def _panel(sea: Sea, meetings: Sequence[Meeting], t: Points, title: str, status:
     curves: tuple[Plot, ...] = ()
     if meetings and len(t) > 1:
         near = np.min([m.distance for m in meetings], axis=0)
+        near = np.minimum(near, near[np.isfinite(near)].max())
         curves = (Plot("Range to closest ship, as planned", (Series("closest", t, near, f"least {near.min():.0f} m"),)),)
     return Panel(title or "start", tuple(status), gauges, tuple(rows), curves)
 
@@ -236,7 +251,7 @@ def _extent(sea: Sea, own: Points, marked: Sequence[Meeting]) -> tuple[float, fl
     """The own way, the ships that come near from their start to their closest point, and what is not too far away."""
     points = [own, sea.route] if len(sea.route) else [own]
     limit = 3.0 * max(float(np.ptp(np.vstack(points), axis=0).max()), 400.0)
-    points += [m.track[: m.nearest + 1] for m in marked]
+    points += [_seen(m.track[: m.nearest + 1]) for m in marked]
     for s in sea.others():
         place = np.array([sea.place(s)])
         if np.hypot(*(place[0] - own[0])) < limit:

@@ -267,8 +267,9 @@ def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int, slots: 
     v["turn_constant"][j] = ship.turns_constantly(scenario.preset)
     _write_station(v, j, mmsi, _AIS[ship.ais_class])
     if ship.track is not None:
-        _, north, east, course, speed, *told = ship.track[0][0]
-        _write_motion(v, j, (north, east), (told[0] if told else course) * DEG, speed)
+        place, heading, speed, seen = tracks.start_of(ship.track)
+        _write_motion(v, j, place, heading, speed)
+        v["active"][j] = seen
     else:
         start, following = (scenario.local(place) for place in ship.waypoints[:2])
         heading = math.atan2(following[1] - start[1], following[0] - start[0])
@@ -280,7 +281,7 @@ def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int, slots: 
 
 
 def _write_replay(ship: Ship, w: Any, j: int) -> None:
-    """Let vessel j sail its track before it behaves; whether it is there at tick 0 is for the kernel to say."""
+    """Let vessel j sail its track before it behaves."""
     v, r = w["vessels"], w["replays"]
     r["then"][j], v["behaviour"][j] = v["behaviour"][j], state.BEHAVIOUR_REPLAY
     if ship.handover is not None:

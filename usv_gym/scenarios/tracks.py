@@ -22,6 +22,7 @@ from ..world.state import KNOT_FIELDS
 
 Knot: TypeAlias = Sequence[float]
 Parts: TypeAlias = Sequence[Sequence[Knot]]
+Floats: TypeAlias = NDArray[np.float64]
 
 #: header of the CSV file: the ship's name, the number of the part, a knot
 HEADER = ("ship", "part", "t", "north", "east", "course_deg", "speed", "heading_deg")
@@ -100,7 +101,7 @@ def check(parts: Parts) -> None:
             before = round(knot[0] * 1e6)
 
 
-def pool(tracks: Iterable[Parts]) -> NDArray[np.float64]:
+def pool(tracks: Iterable[Parts]) -> Floats:
     """Rows [n, 7] of the kernels' pool (traffic/replay.py) for tracks, one after the other."""
     rows: list[tuple[float, ...]] = []
     for parts in tracks:
@@ -111,6 +112,42 @@ def pool(tracks: Iterable[Parts]) -> NDArray[np.float64]:
                 rows.append((float(round(t * 1e6)), north, east, speed * math.cos(chi), speed * math.sin(chi), psi,
                              float(i + 1 < len(part))))  # fmt: skip
     return np.array(rows, np.float64).reshape(-1, KNOT_FIELDS)
+
+
+def hermite(s: Floats, span: Floats, x0: Floats, x1: Floats, v0: Floats, v1: Floats) -> Floats:
+    """Places [n, 2] on the cubics through x0 and x1 [n, 2] with velocities v0 and v1, a share s [n] of the span [n, s]."""
+    s, span = s[:, None], span[:, None]
+    return np.asarray((1 + 2 * s) * (1 - s) ** 2 * x0 + s * (1 - s) ** 2 * span * v0
+                      + s**2 * (3 - 2 * s) * x1 + s**2 * (s - 1) * span * v1)  # fmt: skip
+
+
+def along(rows: Floats, t: Floats) -> Floats:
+    """Places N, E [n, 2] at times t [n, s] of a ship whose track is these rows of the pool; NaN where it is not seen.
+
+    What the kernel does (traffic/replay.py), for those who look ahead or back.
+    """
+    at = np.asarray(t, np.float64) * 1e6
+    k = np.searchsorted(rows[:, 0], at, side="right") - 1
+    ends = (k > 0) & (rows[k, 6] == 0.0) & (rows[k, 0] == at)  # the last knot of a part is still the ship
+    k = np.clip(np.where(ends, k - 1, k), 0, len(rows) - 2)
+    a, b = rows[k], rows[k + 1]
+    s = (at - a[:, 0]) / (b[:, 0] - a[:, 0])
+    places = hermite(s, (b[:, 0] - a[:, 0]) * 1e-6, a[:, 1:3], b[:, 1:3], a[:, 3:5], b[:, 3:5])
+    return np.where(((s >= 0.0) & (s <= 1.0) & (a[:, 6] == 1.0))[:, None], places, np.nan)
+
+
+def start_of(parts: Parts) -> tuple[tuple[float, float], float, float, bool]:
+    """Place N, E [m], heading [rad], speed [m/s] of a track at the start of the scenario, and whether the ship is seen then.
+
+    Of a ship that is not there yet: those of its first knot.
+    """
+    rows = pool([parts])
+    places = along(rows, np.array([0.0, 0.1]))
+    if np.isnan(places).any():
+        return (float(rows[0, 1]), float(rows[0, 2])), float(rows[0, 5]), math.hypot(rows[0, 3], rows[0, 4]), False
+    heading = float(np.interp(0.0, rows[:, 0], np.unwrap(rows[:, 5])))
+    (n0, e0), (n1, e1) = places.tolist()
+    return (n0, e0), heading, math.hypot(n1 - n0, e1 - e0) / 0.1, True
 
 
 def knots(parts: Parts) -> int:

@@ -75,7 +75,10 @@ def replay(w, tracks, seconds):
     v, r = w.vessels, w.replays
     end_us = w.tick * w.dt_us + w.frame_ticks * w.dt_us
     for j in range(v.active.shape[0]):
-        if r.count[j] == 0 or v.behaviour[j] != BEHAVIOUR_REPLAY or v.controlled[j]:
+        if r.count[j] == 0 or v.controlled[j]:
+            continue
+        if v.behaviour[j] != BEHAVIOUR_REPLAY:  # an event has given it something else to do
+            _leave_track(w, tracks, j)
             continue
         if not _find(w, tracks, j, end_us):
             if v.active[j]:
@@ -94,8 +97,11 @@ def replay(w, tracks, seconds):
         v.nu[j, 0] = vn * c + ve * s
         v.nu[j, 1] = ve * c - vn * s
         v.nu[j, 2] = turn / seconds
-        if r.hands_over[j] and math.hypot(vn, ve) > _MAKES_WAY and _own_ship_near(w, j):
-            _hand_over(w, tracks, j, k)
+        v.speed[j] = math.hypot(vn, ve)
+        if r.hands_over[j] and v.speed[j] > _MAKES_WAY and _own_ship_near(w, j):
+            v.behaviour[j] = r.then[j]
+            v.heading_set[j] = atan2(ve, vn)
+            _leave_track(w, tracks, j)
 
 
 @inner
@@ -146,14 +152,13 @@ def _own_ship_near(w, j):
 
 
 @inner
-def _hand_over(w, tracks, j, k):
-    """Let the behaviour have vessel j for good, at its present speed, with what is left of its track as its route."""
+def _leave_track(w, tracks, j):
+    """Let its behaviour have vessel j for good, at its present speed, with what is left of its track as its route."""
     v, r, route = w.vessels, w.replays, w.routes
-    v.behaviour[j] = r.then[j]
+    k = r.knot[j]
+    r.count[j] = 0
     r.changes[j] += 1
-    v.speed[j] = math.hypot(v.velocity[j, 0], v.velocity[j, 1])
-    course = atan2(v.velocity[j, 1], v.velocity[j, 0])
-    v.heading_set[j] = course
+    course = atan2(v.velocity[j, 1], v.velocity[j, 0]) if v.speed[j] > _MAKES_WAY else v.eta[j, 2]
     left = 0
     while tracks[k + left, SEEN] != 0.0:  # the last knot of a track is never seen to a next one
         left += 1

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...units import DEG, KNOT
+from ..tracks import along, hermite
 from .fixes import Selection
 
 Floats = NDArray[np.float64]
@@ -159,14 +160,6 @@ def headings(velocity: Floats, told: Floats, before: float = math.nan) -> Floats
     return psi[known[np.maximum(place, 0)]]
 
 
-def hermite(t: Floats, t0: float, t1: float, x0: Floats, x1: Floats, v0: Floats, v1: Floats) -> Floats:
-    """Cubic through x0 [2] and x1 with velocities v0 and v1 there, at times t [n] between t0 and t1; [n, 2]."""
-    span = t1 - t0
-    s = ((t - t0) / span)[:, None]
-    return np.asarray((1 + 2 * s) * (1 - s) ** 2 * x0 + s * (1 - s) ** 2 * span * v0
-                      + s**2 * (3 - 2 * s) * x1 + s**2 * (s - 1) * span * v1)  # fmt: skip
-
-
 def split_where_worst(count: int, off: Callable[[int, int], Floats]) -> NDArray[np.int64]:
     """Indices to keep of a sequence of ``count``, after Ramer, Douglas and Peucker.
 
@@ -192,8 +185,8 @@ def thin(t: Floats, x: Floats, v: Floats, psi: Floats, tolerance: float = TOLERA
 
     def off(a: int, b: int) -> Floats:
         inner = slice(a + 1, b)
-        apart = np.hypot(*(hermite(t[inner], t[a], t[b], x[a], x[b], v[a], v[b]) - x[inner]).T)
         share = (t[inner] - t[a]) / (t[b] - t[a])
+        apart = np.hypot(*(hermite(share, np.full(b - a - 1, t[b] - t[a]), x[a], x[b], v[a], v[b]) - x[inner]).T)
         swing = np.abs(turned[a] + share * (turned[b] - turned[a]) - turned[inner])
         return np.asarray(np.maximum(apart / tolerance, swing / HEADING_TOLERANCE))
 
@@ -225,13 +218,10 @@ def clean(table: Floats, place: Selection, *, max_gap: float = MAX_GAP, toleranc
 
 def at_times(track: Track, t: Floats) -> Floats:
     """Positions N, E [n, 2] of a track at times t [n]; NaN where the ship is not seen."""
-    out = np.full((len(t), 2), np.nan)
+    rows = []
     for part in track.parts:
-        inside = np.flatnonzero((t >= part[0, 0]) & (t <= part[-1, 0]))
-        k = np.clip(np.searchsorted(part[:, 0], t[inside], side="right") - 1, 0, len(part) - 2)
-        for i in np.unique(k):
-            rows = inside[k == i]
-            a, b = part[i], part[i + 1]
-            va, vb = (knot[4] * np.array([math.cos(knot[3]), math.sin(knot[3])]) for knot in (a, b))
-            out[rows] = hermite(t[rows], a[0], b[0], a[1:3], b[1:3], va, vb)
-    return out
+        seen = np.ones(len(part))
+        seen[-1] = 0.0
+        v = part[:, 4:5] * np.column_stack([np.cos(part[:, 3]), np.sin(part[:, 3])])
+        rows.append(np.column_stack([part[:, 0] * 1e6, part[:, 1:3], v, part[:, 5], seen]))
+    return along(np.vstack(rows), t)

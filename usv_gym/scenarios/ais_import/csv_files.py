@@ -161,7 +161,10 @@ def columns(header: Sequence[str], path: Path, required: Sequence[str] = _REQUIR
             f"no column for {key} (called {' or '.join(_NAMES[key][:2])}){hint if 'mean' in hint else ''}"
             for key, hint in zip(missing, likely, strict=True)
         )
-        shown = ", ".join(name for name in header if name.strip())[:200] or "nothing"
+        shown = "".join(c for c in ", ".join(filter(str.strip, header))[:200] if c.isprintable()) or "nothing"
+        if len(missing) == len(required):
+            raise ConfigError(f"{path}:1: neither NMEA sentences nor a table of AIS: no columns for {', '.join(required)}; "
+                              f"the first line has: {shown}")  # fmt: skip
         raise ConfigError(f"{path}:1: {what}; the header has: {shown}")
     return {key: i for key, i in found.items() if i >= 0}
 

@@ -92,7 +92,7 @@ class Harvest:
     """Everything that was found: ``ships`` by MMSI within the selection, ``own`` the fixes of the receiver itself."""
 
     selection: Selection
-    #: what the particulars of one station are; stations without a fix in the selection are dropped at the end
+    #: what stations say about themselves, by MMSI; of NMEA logs also those without a fix in the selection
     particulars: dict[int, Particulars] = field(default_factory=dict)
     ships: dict[int, Fixes] = field(default_factory=dict)
     own: Fixes = field(default_factory=Fixes)

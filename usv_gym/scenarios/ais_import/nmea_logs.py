@@ -14,10 +14,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from ...config import ConfigError
 from .csv_files import opened
 from .fixes import NAN, Harvest, Progress, is_ship
 
 _SENTENCE = re.compile(rb"[!$][A-Z\-]{2}[A-Z]{2,3}[0-9A-Z]?,[^!$*\\]*\*[0-9A-F]{2}$", re.IGNORECASE)
+_PATIENCE = 10_000  #: position reports that wait for the first clock
+_CLOCKS = "expected tag blocks with c:, or RMC, ZDA or $PGHP sentences"
 _EVERY = 5_000  #: lines between two reports of progress
 _LATE, _EARLY = 10.0, 5.0  #: [s] a receiver's clock may be behind or ahead of a fix whose second is told
 #: messages that are used: positions of class A and B, particulars
@@ -49,7 +52,7 @@ def read_nmea(path: Path, harvest: Harvest, progress: Progress | None = None) ->
     Raises
     ------
     ConfigError
-        if the file cannot be read.
+        if the file cannot be read, or nothing in it tells the time.
     """
     from pyais.exceptions import AISBaseException
     from pyais.messages import NMEASentenceFactory
@@ -98,6 +101,8 @@ def read_nmea(path: Path, harvest: Harvest, progress: Progress | None = None) ->
                 continue
             if t != t and sentence.ais_id not in (5, 24):
                 waiting.append((message, own))
+                if len(waiting) > _PATIENCE:
+                    raise ConfigError(f"{path}: no time in the first {len(waiting):,} position reports: {_CLOCKS}")
                 continue
             while waiting:
                 _use(*waiting.pop(0), t, harvest)
@@ -105,7 +110,7 @@ def read_nmea(path: Path, harvest: Harvest, progress: Progress | None = None) ->
     if fragments:
         odd["AIS messages with a part missing"] += len(fragments)
     if waiting:
-        odd["position reports without any time"] += len(waiting)
+        raise ConfigError(f"{path}: no time for its {len(waiting):,} position reports: {_CLOCKS}")
 
 
 def _joined(part: Any, fragments: dict[Any, list[Any]]) -> Any:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ...config import ConfigError, dump_yaml
+from ...config import ConfigError, dump_yaml, locate, suggestion
 from ...units import DEG
+from ..behaviours import KINDS
 from ..loader import load_scenario
 from ..schema import MAX_WAYPOINTS, OWN_SHIP, class_of_length
 from ..tracks import write_tracks
@@ -78,6 +79,9 @@ def import_ais(request: Request, progress: Progress | None = None) -> Imported:
     """
     if not request.files:
         raise ConfigError("import-ais: expected at least one file")
+    if request.behaviour not in ("", *KINDS):
+        raise ConfigError(f"--behaviour {request.behaviour}: unknown{suggestion(request.behaviour, KINDS)}")
+    locate("vessels", request.vessel)
     start = request.start
     if start is None:
         found = _harvest(request, replace(request.area, start=math.inf, end=math.inf), progress)
