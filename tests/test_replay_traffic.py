@@ -10,6 +10,7 @@ import pytest
 
 from usv_gym.config import ConfigError
 from usv_gym.engine import advance_worlds, reset_worlds
+from usv_gym.render.scene_start import scene_of_start
 from usv_gym.scenarios.ais_import.clean import Track, at_times
 from usv_gym.scenarios.build import build_worlds, track_pool
 from usv_gym.scenarios.commands import Commands
@@ -155,6 +156,16 @@ def test_an_event_takes_a_ship_off_its_track_at_its_present_speed():
     assert worlds["routes"]["waypoint"][0, 1, 1] == pytest.approx([1500.0, 370.0])
     sail(worlds, tracks, 60.0)
     assert math.dist(worlds["vessels"]["eta"][0, 1, :2], (1500.0, 370.0)) < 60.0
+
+
+def test_the_chart_of_the_start_shows_where_a_replayed_ship_will_sail():
+    worlds, names, tracks, _ = sea(own=(1200.0, 300.0))
+    scene = scene_of_start(worlds[0], names, cruise=1.0, duration=250.0, tracks=tracks)
+    lines = [p.points for p in scene.layers["tracks"] if getattr(p, "role", "") in ("track_ship", "track_later")]
+    places = np.vstack(lines)
+    assert np.isfinite(places).all()
+    for knot in (CURVE[0][1], CURVE[0][2], CURVE[1][0]):
+        assert np.hypot(*(places - knot[1:3]).T).min() < 10.0
 
 
 def test_notices_and_commands_know_replayed_ships():

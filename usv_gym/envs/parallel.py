@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from ..config import ConfigError
-from ..scenarios.build import build_worlds, write_agent
+from ..scenarios.build import build_worlds, track_pool, write_agent
 from ..scenarios.loader import load_scenario
 from ..tasks.step import BEGIN, STEP, run_batch
 from ..tasks.task import (
@@ -31,7 +31,6 @@ from ..tasks.task import (
     task_record,
     unflatten,
 )
-from ..traffic.replay import NO_TRACKS
 from ..world.land import NO_LAND
 from ..world.state import CAPACITIES
 from ..world.vessel import VesselModel, load_vessel
@@ -121,6 +120,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self.worlds, self.names = build_worlds(
             self.scenario, 1, capacity=(V, M), observers=range(MAX_AGENTS), agents=MAX_AGENTS
         )
+        self._tracks = track_pool(self.scenario)
         self._template = self.worlds.copy()
         self._obs = np.zeros((1, MAX_AGENTS, observation_size(config)), np.float32)
         self._episodes = np.zeros((1, MAX_AGENTS), episode_dtype())
@@ -149,7 +149,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self._draw(self._rng)
         self._episodes["what"] = BEGIN
         with compiling():
-            run_batch(self.worlds, NO_LAND, NO_TRACKS, self._tasks, self._episodes, self._obs, NO_ROWS)
+            run_batch(self.worlds, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS)
         self.agents = list(self.possible_agents)
         return self._observations(self.agents), {agent: {"scales": self._scales(agent)} for agent in self.agents}
 
@@ -174,7 +174,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
             width = int(self._tasks["channels"][self._slot[agent]])
             episodes["action"][self._slot[agent], :width] = action
         self._episodes["what"] = STEP
-        if run_batch(self.worlds, NO_LAND, NO_TRACKS, self._tasks, self._episodes, self._obs, NO_ROWS) >= 0:
+        if run_batch(self.worlds, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS) >= 0:
             raise ValueError(f"actions {dict(actions)!r}: expected finite numbers, and whole ones from 0 to 4 for discrete")
         slots = {agent: self._slot[agent] for agent in here}
         rewards = {agent: float(episodes["reward"][k]) for agent, k in slots.items()}

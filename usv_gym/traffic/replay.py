@@ -60,7 +60,7 @@ def begin_replay(w, tracks):
     """Put every replayed ship where its track has it at tick 0."""
     v, r = w.vessels, w.replays
     for j in range(v.active.shape[0]):
-        if r.count[j] == 0 or v.behaviour[j] != BEHAVIOUR_REPLAY:
+        if r.count[j] == 0 or v.behaviour[j] != BEHAVIOUR_REPLAY or r.first[j] + r.count[j] > tracks.shape[0]:
             continue
         r.knot[j] = r.first[j]
         v.active[j] = 0
@@ -75,7 +75,7 @@ def replay(w, tracks, seconds):
     v, r = w.vessels, w.replays
     end_us = w.tick * w.dt_us + w.frame_ticks * w.dt_us
     for j in range(v.active.shape[0]):
-        if r.count[j] == 0 or v.controlled[j]:
+        if r.count[j] == 0 or v.controlled[j] or r.first[j] + r.count[j] > tracks.shape[0]:  # the last: not its pool
             continue
         if v.behaviour[j] != BEHAVIOUR_REPLAY:  # an event has given it something else to do
             _leave_track(w, tracks, j)
