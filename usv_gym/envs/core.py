@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..config import ConfigError, Document, validate
 from ..scenarios.build import build_worlds, track_pool, write_weather
 from ..scenarios.families import FAMILIES
+from ..scenarios.families.failures import sample_failures
 from ..scenarios.land import scenario_coast
 from ..scenarios.loader import Source, load_scenario
 from ..scenarios.schema import Scenario, Weather
@@ -247,6 +248,9 @@ class Core:
             self._set_weather(b, generators[b])
         if self._family is not None:
             self._family.sample(self.worlds, mask, self.difficulty, self.model, self.scenario)
+            if self.scenario.family is not None and self.scenario.family.failures > 0.0:
+                time = 0.5 * self.scenario.simulation.duration  # what a route takes, about
+                sample_failures(self.worlds, mask, self.scenario.family.failures, self.difficulty, time)
 
     def _set_weather(self, b: int, generator: np.random.Generator) -> None:
         """Overwrite the weather of row b where the caller or the family asks for it."""

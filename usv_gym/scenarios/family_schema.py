@@ -32,6 +32,7 @@ class Family(Model):
 
     name: str
     difficulty: Share = Field(default=0.5, description="0 to 1: how much there is, and how near it comes")
+    failures: Share = Field(default=0.0, description="0 to 1: how much goes wrong in an episode; 0: nothing")
     weather: Literal["random", "scenario"] = Field(
         default="random", description="drawn by difficulty, or that of the scenario (the rule where one is given)"
     )

@@ -416,7 +416,8 @@ class Scenario(Model):
         """True if there may be false alarms."""
         w, s = self.weather, self.sensors
         rates = (w.rain, w.fog, w.snow, s.radar.false_alarms, s.lidar.false_alarms)
-        return any(rates) or any(isinstance(event, Shower) for event in self.events)
+        drawn = self.family is not None and self.family.failures > 0.0
+        return any(rates) or drawn or any(isinstance(event, Shower) for event in self.events)
 
     def phantoms(self) -> list[str]:
         """Names of targets that are not there, false alarms and spoofed stations, from the last obstacle slot downwards."""

@@ -5,7 +5,7 @@ within its range.  What it is to another vessel (``world/encounter.py``) is deci
 remembered until that vessel is past and clear.  Action:
 
 - who gives way (Rules 13 to 16) alters course by the smallest readily apparent angle (Rule 8 b) that clears all vessels in
-  range, to starboard except when overtaking; where no course does, it also slackens speed or stops (Rule 8 e);
+  range, to starboard except when overtaking; where no course does, or it would be led far off its route, it slackens speed or stops (Rule 8 e);
 - who stands on (Rule 17) keeps course and speed until the other's inaction leaves ``extremis_time``; then it acts too, not to
   port for a vessel on its port side (Rule 17 c).
 
@@ -37,6 +37,8 @@ STEP = 15.0 * DEG  #: between the courses that are tried, up to a right angle
 ANCHORED = 0.25  #: [m/s] below which another vessel counts as one at rest, which has no rights of way
 EARLY = 2.0  #: an encounter begins at so many times act_time and clearance, before action is due
 RESUME = 1.25  #: clearance at which the route is taken up again, in those that make it evade
+NEAR, VERY_NEAR = 2.5, 1.25  #: safe distances at which it gives way, and acts as stand-on, however slowly they close
+PATIENCE = 3.0  #: times act_time that it evades before it rather stops
 IN_DOUBT = 0.5  #: share of the clearance below which a stand-on ship does not trust the other's manoeuvre
 
 
@@ -102,7 +104,9 @@ def _remember(w, j, base, vn, ve, speed):
         w.order[count] = k
         count += 1
         d, t = _approach(w, j, k, vn, ve, 0.0)
-        if not (0.0 < t < early and d < EARLY * _safe(w, j, k)):
+        safe = _safe(w, j, k)
+        near2 = (EARLY * NEAR * safe) ** 2
+        if t <= 0.0 or d >= EARLY * safe or (t >= early and dn * dn + de * de >= near2):
             continue
         slot, last = -1, t  # a free place, else that of the encounter that is furthest ahead in time
         known = False
@@ -154,13 +158,16 @@ def _must_act(w, j, vn, ve):
         safe = margin * _safe(w, j, k)
         if t <= 0.0 or d >= safe:
             continue
+        apart = math.hypot(v.eta[k, 0] - v.eta[j, 0], v.eta[k, 1] - v.eta[j, 1])
         if role in (CROSSING_STAND_ON, OVERTAKEN):
-            if t >= margin * p.extremis_time[j] or (d >= IN_DOUBT * safe and p.phase[j] == 0):
+            if t >= margin * p.extremis_time[j] and apart >= VERY_NEAR * safe:
+                continue
+            if d >= IN_DOUBT * safe and p.phase[j] == 0:
                 continue
             bearing = wrap(atan2(v.eta[k, 1] - v.eta[j, 1], v.eta[k, 0] - v.eta[j, 0]) - v.eta[j, 2])
             to_port = to_port and role == OVERTAKEN and bearing > 0.0
         else:
-            if t >= margin * p.act_time[j]:
+            if t >= margin * p.act_time[j] and apart >= NEAR * safe:
                 continue
             to_port = to_port and role == OVERTAKING
         act = True
@@ -178,6 +185,11 @@ def _look(w, j, base, speed):
     if not act:
         p.phase[j] = 0
         p.factor[j] = 1.0
+        return
+    if p.phase[j] == 0:
+        p.since[j] = w.tick
+    elif (w.tick - p.since[j]) * w.dt > PATIENCE * p.act_time[j]:
+        p.factor[j] = 0.0  # evading did not help, since the other sails along: let it go ahead
         return
     if p.phase[j] and _room(w, j, count, p.course[j], speed * p.factor[j]) >= 1.0:
         return  # what it does will do

@@ -192,6 +192,7 @@ def _pilots(V: int) -> Dtype:
         ("phase", i1, (V,)),  # 0: on its route; COLREGs 1: evading; hostile 1: closing in, 2: has crossed, 3: done with it
         # course [rad] that it steers off its route (erratic: off that of its route), share of its speed that it makes
         ("course", f8, (V,)), ("factor", f8, (V,)),
+        ("since", i8, (V,)),  # tick at which it left its route
         ("met", i2, (V, R)), ("role", i1, (V, R)),  # vessel slot, and the locked Encounter towards it; role 0: free
     ], align=True)  # fmt: skip
 
