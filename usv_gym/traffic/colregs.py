@@ -5,7 +5,8 @@ within its range.  What it is to another vessel (``world/encounter.py``) is deci
 remembered until that vessel is past and clear.  Action:
 
 - who gives way (Rules 13 to 16) alters course by the smallest readily apparent angle (Rule 8 b) that clears all vessels in
-  range, to starboard except when overtaking; where no course does, or it would be led far off its route, it slackens speed or stops (Rule 8 e);
+  range, to starboard except when overtaking; where no course does, or it would be led far off its route, it slackens speed
+  or stops (Rule 8 e);
 - who stands on (Rule 17) keeps course and speed until the other's inaction leaves ``extremis_time``; then it acts too, not to
   port for a vessel on its port side (Rule 17 c).
 
