@@ -169,6 +169,13 @@ def test_wild_fixes_and_a_second_ship_with_the_same_number_are_told_apart():
     assert any(np.array_equal(chain, other, equal_nan=True) for chain in found)
 
 
+def test_a_receiver_gone_mad_costs_time_in_proportion_to_its_reports():
+    draw = np.random.default_rng(0)
+    n = 20_000
+    fixes = np.column_stack([np.arange(n), draw.uniform(-1e7, 1e7, (n, 2)), np.zeros((n, 3))])
+    assert len(clean.chains(fixes)) > n // 2
+
+
 def test_a_gap_makes_two_parts_between_which_the_ship_is_not_seen():
     _, fixes = turning_ship(2, n=300)
     fixes = np.delete(fixes, slice(100, 200), axis=0)

@@ -26,6 +26,7 @@ FASTEST, SLACK, SLACK_TIME = 60.0 * KNOT, 50.0, 3.0
 #: [m] and [s] standard deviations of a reported position and of its time; of SOG [m/s] and COG [rad]
 POSITION_STD, TIME_STD, SPEED_STD, COURSE_STD = 5.0, 1.0, 0.15, 2.0 * DEG
 ACCELERATION = 0.05  #: spectral density of a ship's acceleration [m^2/s^3]
+HULLS = 8  #: that may share an MMSI at a time; with more, the one that was silent longest is over
 STILL = 0.5 * KNOT  #: [m/s] below which course over ground says nothing about heading
 MAX_GAP = 400.0  #: [s] moored ships report every 180 s; one report may be lost
 TOLERANCE = 3.0  #: [m] that thinning may move a ship
@@ -65,6 +66,7 @@ def chains(fixes: Floats) -> list[Floats]:
     Fixes that repeat an earlier one (same time; or same place at speed: a message received twice) are left out.
     """
     open_: list[list[int]] = []
+    over: list[list[int]] = []
     t, n, e, vn, ve = (fixes[:, k].tolist() for k in (T, N, E, VN, VE))
     for i in range(len(t)):
         best, nearest = None, math.inf
@@ -79,13 +81,17 @@ def chains(fixes: Floats) -> list[Floats]:
             if error < nearest:
                 best, nearest = chain, error
         if best is None:
+            if len(open_) == HULLS:
+                oldest = min(open_, key=lambda chain: chain[-1])
+                open_.remove(oldest)
+                over.append(oldest)
             open_.append([i])
             continue
         k = best[-1]
         again = n[i] == n[k] and e[i] == e[k] and math.hypot(vn[i], ve[i]) > STILL and t[i] - t[k] < 30.0
         if t[i] > t[k] and not again:
             best.append(i)
-    return [fixes[chain] for chain in open_]
+    return [fixes[chain] for chain in sorted(over + open_)]
 
 
 def stretches(fixes: Floats, max_gap: float = MAX_GAP) -> list[Floats]:

@@ -104,7 +104,7 @@ def read_nmea(path: Path, harvest: Harvest, progress: Progress | None = None) ->
                 if len(waiting) > _PATIENCE:
                     raise ConfigError(f"{path}: no time in the first {len(waiting):,} position reports: {_CLOCKS}")
                 continue
-            while waiting:
+            while waiting and t == t:
                 _use(*waiting.pop(0), t, harvest)
             _use(message, own, t, harvest)
     if fragments:
