@@ -131,5 +131,5 @@ def test_a_case_is_drawn_at_every_reset():
 
 @pytest.mark.parametrize("case", [23, 0, "8d", "five", -1, True, 1.5, []])
 def test_there_is_no_such_case(case):
-    with pytest.raises(ConfigError, match="family.case"):
+    with pytest.raises(ConfigError, match=r"family\.case"):
         load_scenario({"base": "imazu", "family": {"name": "imazu", "case": case}})

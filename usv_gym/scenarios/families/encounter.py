@@ -30,7 +30,7 @@ from ..family_schema import MOST_SHIPS, RATIOS, SECTORS, Encounters
 from ..schema import Scenario
 from .common import between, put_own_ship, put_ship
 
-ATTEMPTS, ROUNDS = 200, 20  #: draws of a ship before all are drawn anew, and how often
+ATTEMPTS, ROUNDS = 200, 40  #: draws of a ship before all are drawn anew, and how often
 NEWTON = 12  #: steps; quadratic, so far more than it takes
 
 #: what was asked for, per ship: class (Encounter), dcpa [m], tcpa [s], bearing [rad], speed ratio
@@ -142,6 +142,8 @@ def _place(w, j, wish, code, slot, attempt, speed, difficulty, asked):
     found, d, t = encounter(v.eta[0, 0], v.eta[0, 1], speed * co, speed * so, n, e, vn, ve)
     if found != code or abs(d - dcpa) > 1.0e-6 * (1.0 + distance) or abs(t - tcpa) > 1.0e-6 * tcpa:
         return False
+    if abs(math.hypot(vn, ve) - ratio * speed) > 1.0e-9 * speed:
+        return False  # next to a double root, where Newton's method is slow
     if distance < 2.0 * (v.length[0] + length):
         return False  # on top of each other already
     for i in range(1, j):  # clear of the others until all closest points are past
@@ -149,7 +151,7 @@ def _place(w, j, wish, code, slot, attempt, speed, difficulty, asked):
         dn, de = v.eta[i, 0] - n, v.eta[i, 1] - e
         _, when = cpa(dn, de, vn2 - vn, ve2 - ve)
         when = min(max(when, 0.0), 1.25 * wish.tcpa[1])
-        if math.hypot(dn + when * (vn2 - vn), de + when * (ve2 - ve)) < length + v.length[i] + v.length[0]:
+        if math.hypot(dn + when * (vn2 - vn), de + when * (ve2 - ve)) < 0.5 * (length + v.length[i]) + v.length[0]:
             return False
     far = 3.0 * wish.tcpa[1]
     put_ship(w, j, kind, length, length / 6.0 if kind != KIND_BOAT else length / 3.0, math.hypot(vn, ve), n, e,
@@ -175,7 +177,9 @@ def draw_encounters(w, wish, difficulty, speed, asked):
     for turn in range(ROUNDS):
         placed = 0
         for k in range(count):
-            code = wish.codes[k] if wish.exactly else wish.codes[int(between(w, 0, 2 + k, 0.0, 1.0) * wish.n_codes)]
+            code = wish.codes[k]
+            if not wish.exactly:
+                code = wish.codes[int(between(w, 0, 2 + MOST_SHIPS * turn + k, 0.0, 1.0) * wish.n_codes)]
             for attempt in range(ATTEMPTS):
                 if _place(w, 1 + k, wish, code, 200 + MOST_SHIPS * turn + k, attempt, speed, difficulty, asked[k]):
                     placed += 1
