@@ -57,6 +57,7 @@ def show(
     scene = scene_of_start(
         core.worlds[0], core.ids(0), title=name, cruise=core.model.cruise_speed, duration=sea.simulation.duration,
         status=(sea.own_ship.vessel_name, *([f"seed {seed}"] if sea.family else [])), tracks=core.tracks,
+        coast=core.coast(0),
     )  # fmt: skip
     try:
         save_png(scene, target, size=pixel_size, palette=palette)

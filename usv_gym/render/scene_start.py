@@ -15,6 +15,7 @@ import numpy as np
 from ..scenarios.tracks import along
 from ..units import DEG, KNOT, wrap_360
 from ..world.encounter import Encounter, encounters
+from ..world.land import Coast
 from ..world.state import AFTER_CONTINUE, AFTER_LOOP
 from .compose import compose
 from .panel import ENCOUNTERS, clock
@@ -24,7 +25,7 @@ from .sea import HULLS, Sea
 
 STEP = 1.0  #: [s] of the prediction
 LOOP = 3  #: rounds of a loop that are predicted
-FEW = 12  #: obstacles up to which each has its name beside it
+FEW = 12  #: obstacles up to which each that has a name of its own shows it
 ROUTE_SHARE = 0.3  #: closest points are marked up to this share of the own way
 WORDS = {
     Encounter.SAFE: "", Encounter.HEAD_ON: "head-on", Encounter.CROSSING_GIVE_WAY: "crossing, give way",
@@ -69,6 +70,7 @@ def scene_of_start(
     status: Sequence[str] = (),
     hide: Sequence[str] = ("shadows",),
     tracks: Points | None = None,
+    coast: Coast = (),
 ) -> Scene:
     """Scene of a world at its start.
 
@@ -90,13 +92,16 @@ def scene_of_start(
         names of layers to leave out.
     tracks
         pool of recorded tracks [n, 7], of a world with replayed ships.
+    coast
+        the land of the world (`Core.coast`).
     """
-    sea = sea_from_record(world, names)
+    sea = sea_from_record(world, names, coast=coast)
     own = _own_track(world, sea, cruise, duration)
     t = STEP * np.arange(len(own), dtype=np.float64)
     meetings = [_meeting(world, sea, j, own, t, tracks) for j in sea.others() if j < sea.vessels]
     way = float(np.hypot(*np.diff(own, axis=0).T).sum())
-    marked = [m for m in meetings if m.dcpa < max(ROUTE_SHARE * way, 100.0) and 0 < m.nearest < len(t) - 1]
+    near = max(ROUTE_SHARE * way, 100.0)
+    marked = [m for m in meetings if sea.velocity[m.slot].any() and m.dcpa < near and 0 < m.nearest < len(t) - 1]
     extent = _extent(sea, own, marked)
     scene = compose(sea, {}, _panel(sea, meetings, t, title, status), extent, _plan(own, meetings, marked), hide)
     labels = [p for p in scene.layers["labels"] if getattr(p, "role", "") not in ("label_vessel", "label_fixed")]
@@ -155,7 +160,8 @@ def _meeting(world: Any, sea: Sea, j: int, own: Points, t: Points, tracks: Point
     velocity = (own[1] - own[0]) / STEP  # of one who starts at rest, as it will be
     encounters(np.array([[*own[0], *velocity]]), np.array([[[*track[0], *sea.velocity[j]]]]), codes, d, when)
     name = sea.names[j] if j < len(sea.names) else ""
-    return Meeting(j, name or HULLS.get(int(sea.kind[j]), "ship"), Encounter(codes[0, 0]), track, distance,
+    code = Encounter(codes[0, 0]) if sea.velocity[j].any() else Encounter.SAFE  # one at rest is an obstacle
+    return Meeting(j, name or HULLS.get(int(sea.kind[j]), "ship"), code, track, distance,
                    int(distance.argmin()))  # fmt: skip
 
 
@@ -218,7 +224,7 @@ def _names(sea: Sea, meetings: Sequence[Meeting]) -> list[Primitive]:
     obstacles = [s for s in sea.others() if s >= sea.vessels]
     if len(obstacles) <= FEW:
         for s in obstacles:
-            name = sea.names[s] if s < len(sea.names) else ""
+            name = sea.names[s] if s < len(sea.names) and not sea.names[s].startswith("obstacle_") else ""
             labels.append(Label((name,), sea.place(s), "label_fixed", float(sea.radius[s - sea.vessels]), 2.0))
     return [label for label in labels if isinstance(label, Label) and label.lines[0]]
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..config import ConfigError
 from ..units import DEG
 from ..world import state
 from .schema import Current, Obstacle, OwnShip, Scenario, Ship, Visibility, Waves, Weather, Wind
@@ -27,8 +28,18 @@ def freeze(scenario: Scenario, world: Any, names: Sequence[str] | None = None) -
     Building it gives the same motion as the record.  ``names`` [S] are those of the sources; by default ship_1, .. and
     obstacle_1, ..  What the record does not hold (sensors, vessel, time) is taken from ``scenario``, and so are the ships of
     a scenario without a family.
+
+    Raises
+    ------
+    ConfigError
+        if a family drew what a plain scenario does not keep: its coast, or ships that do more than follow waypoints.
     """
     v, m = world["vessels"], world["obstacles"]
+    if scenario.family and (world["land_id"] >= 0 or (v["behaviour"][v["active"] > 0] > state.BEHAVIOUR_WAYPOINTS).any()):
+        raise ConfigError(
+            f"family {scenario.family.name}: its coast and what its ships do cannot be written as a plain scenario; "
+            "name the family and a seed instead"
+        )
     V = len(v["active"])
     ships: dict[str, Ship] = {}
     for j in (1 + np.flatnonzero(v["active"][1:])).tolist():
