@@ -22,14 +22,16 @@ from typing import Any, Self
 from ..envs.notice import compiling
 from ..jit import is_warm
 from .controllers import last_words
-from .flight import FAILED, Flight, Result, Yard, batched
+from .flight import FAILED, Flight, Result, Yard, batched, scenario_of
 
-BATCH = 64  #: seeds of one flight at most; more do not fit into the cache of a processor
+BATCH = 64  #: seeds of one flight at most; more gain nothing
+CROWDED = 20  #: ships; with more, a trajectory of a full batch would fill the memory
 
 
 def flights(flight: Flight, *, most: int = BATCH) -> Iterator[Flight]:
     """Cut a flight into pieces that are worth handing to a worker: batches, or for one's own controllers a few seeds."""
-    size = most if batched(flight.policy) else min(most, 8)
+    crowded = len(scenario_of(flight.case, flight.vessel).ships) > CROWDED
+    size = min(most, 8) if crowded or not batched(flight.policy) else most
     for start in range(0, len(flight.seeds), size):
         yield replace(flight, seeds=flight.seeds[start : start + size])
 

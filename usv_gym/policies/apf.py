@@ -25,8 +25,8 @@ class Tuning:
     """Reach and strength of the field.  The pull along the line of sight is 1; distances are between hulls."""
 
     reach: float = 260.0  #: [m] of what moves
-    reach_fixed: float = 60.0  #: [m] of what does not
-    strength: float = 1.2  #: of the push away from what is approached, at half its reach
+    reach_fixed: float = 80.0  #: [m] of what does not
+    strength: float = 1.8  #: of the push away from what is approached, at half its reach
     swirl: float = 1.8  #: of the push to starboard, where Rules 14 and 15 ask to give way
     swirl_fixed: float = 0.7  #: of the push around what does not move, on the nearer side
     stand_on: float = 0.45  #: share of the reach that a vessel has which has to keep clear of us (Rule 17)

@@ -81,7 +81,7 @@ def _decide(obs, mask, ship_, tuning_, states, actions):
             offset = _SPREAD * ((i + 1) // 2) * (1 if i % 2 == 1 else -1)
             for a in range(_SHARES):
                 share = 1.0 - 0.5 * a
-                price = abs(offset) + k.slow * (1.0 - share) + k.change * abs(base + offset - state.last)
+                price = abs(offset) + k.slow * (1.0 - share) + k.change * abs(wrap(base + offset - state.last))
                 if offset < 0.0:
                     price += k.port_meeting if meeting else k.port
                 if found > 0 and price < best:

@@ -55,7 +55,7 @@ TARGET = np.dtype([
 STATE = np.dtype([
     ("integral", "f8"),  # of the line of sight
     ("last", "f8"), ("slowed", "f8"),  # heading asked for last, off leg or wanted course [rad]; 1 - share of cruising speed
-    ("waited", "f8"),  # [s] for which it has been turned away from where it wants to go
+    ("waited", "f8"),  # [s] for which it has been turned away from where it wants to go; below 0: for which it has stopped
 ], align=True)  # fmt: skip
 
 LAND_TIME = 60.0  #: [s] of cruising within which land is looked at
@@ -74,7 +74,10 @@ def look(obs, ship, own, targets):
     own.leg = atan2(np.float64(obs[3]), np.float64(obs[4]))
     own.distance = obs[6] * ship.distance_scale
     # not obs[5], which is clipped: the waypoint is on the leg, so its bearing tells the same
-    own.cross_track = own.distance * math.sin(own.leg - atan2(np.float64(obs[7]), np.float64(obs[8])))
+    bearing = atan2(np.float64(obs[7]), np.float64(obs[8]))
+    if math.cos(own.leg - bearing) < 0.0:
+        own.leg = bearing  # past the waypoint, and too far off for it to count: back to it
+    own.cross_track = own.distance * math.sin(own.leg - bearing)
     own.next_turn = atan2(np.float64(obs[9]), np.float64(obs[10]))
     own.last = 1 if obs[11] > 0.5 else 0
     found = 0
@@ -146,12 +149,25 @@ def classify(own, ship, targets, found, dcpa, tcpa):
 
 
 @inner
-def wait(state, offset, ship):
-    """Count the time that the ship is turned away by more than 45 deg; it runs back as it is not.
+def wait(state, offset, share, ship):
+    """Count the time that the ship is turned away by more than 45 deg, or has stopped."""
+    if share < 0.3:
+        state.waited -= ship.dt
+    elif abs(offset) > 0.25 * PI:
+        state.waited += ship.dt
+    else:
+        state.waited -= clip(state.waited, -ship.dt, ship.dt)
+
+
+@inner
+def price_of_slowing(price, state, patience):
+    """What slowing down costs, as time goes by [s].
 
     Beside a vessel of the same speed a ship that only turns would never come back to its route: it has to let it go ahead.
+    One that has stopped has to go on at some time.
     """
-    state.waited = max(state.waited + (ship.dt if abs(offset) > 0.25 * PI else -ship.dt), 0.0)
+    waited = state.waited / patience
+    return price / (1.0 + waited) if waited > 0.0 else price * (1.0 - waited)
 
 
 @inner

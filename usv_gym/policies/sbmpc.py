@@ -17,7 +17,7 @@ from ..jit import inner, kernel
 from ..trig import atan2, clip, sincos, wrap
 from ..units import DEG
 from ..world.encounter import CROSSING_STAND_ON, OVERTAKEN
-from .pilot import OWN, TARGET, Pilot, classify, command, line_of_sight, look, wait
+from .pilot import OWN, TARGET, Pilot, classify, command, line_of_sight, look, price_of_slowing, wait
 
 _STEP = 4.0  # [s] of the prediction
 _STEPS = 45
@@ -34,8 +34,9 @@ _CROSSED = math.cos(68.5 * DEG)
 class Tuning:
     """The paper's parameters, scaled to craft of ten metres at five metres a second.  Distances are between hulls."""
 
-    d_safe: float = 100.0  #: [m] nearer is a hazard
-    d_safe_fixed: float = 25.0  #: [m] the same of what does not move
+    domain: float = 3.0  #: lengths of both vessels: nearer to what moves is a hazard,
+    d_safe: float = 120.0  #: [m] but not farther than this
+    d_safe_fixed: float = 22.0  #: [m] the same of what does not move
     d_close: float = 220.0  #: [m] nearer, the rules apply
     horizon: float = 160.0  #: [s] T
     horizon_fixed: float = 60.0  #: [s] the same for what does not move
@@ -43,6 +44,7 @@ class Tuning:
     p: float = 1.0  #: exponent of time in the risk factor
     q: float = 4.0  #: exponent of distance
     collision: float = 60.0  #: K_coll [s] of meeting at twice the cruising speed; goes with the square of the speed
+    collision_fixed: float = 12.0  #: [s] the same of what does not move
     rule: float = 3.0  #: kappa of breaking Rule 14 or 15
     committed: float = 8.0  #: [s] for so long a distance that does not shrink is no hazard
     settled: float = 12.0  #: [s] a behaviour is not judged by the rules before it has taken effect
@@ -113,7 +115,7 @@ def _hazard(path, own, ship, k, targets, found, enough):
     for j in range(found):
         t = targets[j]
         size = t.radius + 0.5 * ship.length
-        safe = k.d_safe if t.moves else k.d_safe_fixed
+        safe = min(2.0 * k.domain * size, k.d_safe) if t.moves else k.d_safe_fixed
         horizon = k.horizon if t.moves else k.horizon_fixed
         if t.code == CROSSING_STAND_ON or t.code == OVERTAKEN:
             horizon = k.stand_on
@@ -141,7 +143,7 @@ def _hazard(path, own, ship, k, targets, found, enough):
                 wx, wy = path[i, 2] - t.vx, path[i, 3] - t.vy
                 speed2 = (wx * wx + wy * wy + 0.25 * ship.cruise * ship.cruise) / (4.0 * ship.cruise * ship.cruise)
                 since = max(time - (1.0 - share) * _STEP, 1.0)
-                hazard = k.collision * speed2 * (safe / d) ** k.q / since ** k.p
+                hazard = (k.collision if t.moves else k.collision_fixed) * speed2 * (safe / d) ** k.q / since ** k.p
             ruled = t.moves and d < k.d_close and time >= k.settled and horizon == k.horizon
             if ruled and _breaks_rules(path[i, 0], path[i, 1], path[i, 2], path[i, 3], t, time):
                 hazard += k.rule
@@ -167,7 +169,7 @@ def _decide(obs, mask, ship_, tuning_, states, actions):
         line_of_sight(own, ship, state)
         classify(own, ship, targets, found, k.d_safe, k.horizon)
         best, best_offset, best_share = math.inf, 0.0, 1.0
-        propulsion = k.propulsion / (1.0 + state.waited / k.patience)
+        propulsion = price_of_slowing(k.propulsion, state, k.patience)
         for i in range(_OFFSETS.shape[0]):
             offset = _OFFSETS[i]
             for a in range(_SHARES.shape[0]):
@@ -186,7 +188,7 @@ def _decide(obs, mask, ship_, tuning_, states, actions):
                     cost += _hazard(path, own, ship, k, targets, found, best - cost)
                 if cost < best:
                     best, best_offset, best_share = cost, offset, share
-        wait(state, best_offset, ship)
+        wait(state, best_offset, best_share, ship)
         state.last, state.slowed = best_offset, 1.0 - best_share
         if best_offset != 0.0:
             state.integral = integral  # off the track on purpose

@@ -16,27 +16,31 @@ from ..jit import inner, kernel
 from ..trig import sincos, wrap
 from ..units import DEG
 from ..world.encounter import CROSSING_GIVE_WAY, CROSSING_STAND_ON, HEAD_ON, OVERTAKEN, SAFE
-from .pilot import OWN, TARGET, Pilot, classify, command, line_of_sight, look, wait
+from .pilot import OWN, TARGET, Pilot, classify, command, line_of_sight, look, price_of_slowing, wait
 
 _SPREAD, _OFFSETS = 5.0 * DEG, 49  # headings from 120 deg to port to 120 deg to starboard of the wanted one
+_DELAY = 1.5  # [s] before it begins to turn
+_ARC_STEP = 3.0  # [s] at which it looks around in a turn
 _SHARES = 5  # of the cruising speed: 1, 3/4, 1/2, 1/4, 0
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """Sizes of the velocity obstacles, and the cost of a velocity.  Distances are between hulls, beyond a ship's length."""
+    """Sizes of the velocity obstacles, and the cost of a velocity.  Distances are between hulls."""
 
-    margin: float = 70.0  #: [m] kept from what moves
-    margin_fixed: float = 12.0  #: [m] kept from what does not
+    domain: float = 2.1  #: lengths of both vessels kept from what moves,
+    margin: float = 90.0  #: [m] but not more
+    margin_fixed: float = 20.0  #: [m] kept from what does not
+    on_arc: float = 0.5  #: share of the margin kept while turning
     horizon: float = 120.0  #: [s] a velocity that meets something later than this is free
     horizon_fixed: float = 35.0  #: [s] the same of what does not move
-    stand_on: float = 45.0  #: [s] the same of a vessel that has to keep clear of us (Rule 17)
+    stand_on: float = 60.0  #: [s] the same of a vessel that has to keep clear of us (Rule 17)
     rule_dcpa: float = 120.0  #: [m] nearer than this on the route, a vessel is one that the rules are about
     rule_tcpa: float = 150.0  #: [s]
     turn: float = 1.0  #: cost of a radian off the wanted heading
     slow: float = 4.0  #: of standing still instead of cruising
     patience: float = 30.0  #: [s] of being turned away, after which slowing down costs half
-    change: float = 0.5  #: of a radian off the heading asked for last
+    change: float = 0.8  #: of a radian off the heading asked for last
     timid: float = 0.6  #: of a turn that nobody would notice (Rule 8), less than ``apparent``
     apparent: float = 30.0 * DEG  #: [rad]
     unlawful: float = 6.0  #: of passing on the wrong side
@@ -60,30 +64,43 @@ def _time_to_contact(px, py, vx, vy, reach):
 
 
 @inner
-def _cost(turn, offset, speed, own, ship, k, targets, found, enough):
+def _cost(turn, offset, speed, own, ship, k, targets, found, arc, enough):
     """What the velocity (turn off the present heading, speed) costs for the sake of the targets; at most about ``enough``."""
     s, c = sincos(turn)
     vx, vy = speed * c, speed * s
-    # it takes a while to turn, until when the ship sails on as it does now, and to gather or to lose way
-    lag = 0.5 * abs(turn) / ship.turn_rate
-    way = (own.u - speed) * ship.speed_time
-    sx, sy = (own.u - vx) * lag + way * c, (own.v - vy) * lag + way * s
+    # it takes a while to turn: the new velocity holds from the end of an arc on, and a ship that slows runs on a little
+    radius = own.u / ship.turn_rate
+    then = _DELAY + abs(turn) / ship.turn_rate
+    points = min(1 + int(then / _ARC_STEP), arc.shape[0])
+    for i in range(points):
+        part = turn * (i + 1) / points
+        ps, pc = sincos(part)
+        arc[i, 0] = own.u * _DELAY + radius * abs(ps)
+        arc[i, 1] = radius * (1.0 - pc) * (1.0 if turn > 0.0 else -1.0)
+        arc[i, 2] = _DELAY + abs(part) / ship.turn_rate
+    run = max(own.u - speed, 0.0) * ship.speed_time
+    ex, ey = arc[points - 1, 0] + run * c, arc[points - 1, 1] + run * s
     cost = 0.0
     for j in range(found):
         t = targets[j]
-        margin = ship.length + (k.margin if t.moves else k.margin_fixed)
         bare = t.radius + 0.5 * ship.length
+        margin = min(2.0 * k.domain * bare, k.margin) if t.moves else k.margin_fixed
         reach = bare + margin
-        px, py = t.x - sx, t.y - sy
+        px, py = t.x + t.vx * then - ex, t.y + t.vy * then - ey
         d = math.hypot(px, py)
-        if d < reach:
-            reach = max(bare, 0.97 * d)  # inside the margin already: any velocity that leads out of it is free
+        on_arc = d
+        for i in range(points):
+            on_arc = min(on_arc, math.hypot(t.x + t.vx * arc[i, 2] - arc[i, 0], t.y + t.vy * arc[i, 2] - arc[i, 1]))
+        if on_arc < min(bare + k.on_arc * margin, 0.95 * t.distance):
+            cost = max(cost, 2.0 * k.danger)  # met while it is still turning or losing way
+        # inside the margin already: a velocity that leads out of it is free
+        reach = max(bare, min(reach, 0.995 * d, 0.995 * t.distance))
         horizon = k.horizon if t.moves else k.horizon_fixed
         gives_way = t.code == CROSSING_STAND_ON or t.code == OVERTAKEN
         if gives_way:
             horizon = k.stand_on
         wx, wy = t.vx - vx, t.vy - vy
-        contact = _time_to_contact(px, py, wx, wy, reach)
+        contact = then + _time_to_contact(px, py, wx, wy, reach)
         if contact < horizon:
             cost = max(cost, k.danger * (2.0 - contact / horizon))
         if t.code == HEAD_ON or t.code == CROSSING_GIVE_WAY:
@@ -104,6 +121,7 @@ def _decide(obs, mask, ship_, tuning_, states, actions):
     ship, k = ship_[0], tuning_[0]
     own = np.zeros(1, OWN)[0]
     targets = np.zeros(ship.targets + ship.land, TARGET)
+    arc = np.zeros((8, 3))  # x, y [m] and time [s] along a turn
     for b in range(obs.shape[0]):
         if not mask[b]:
             continue
@@ -116,24 +134,24 @@ def _decide(obs, mask, ship_, tuning_, states, actions):
         for j in range(found):
             ruled = ruled or targets[j].code != SAFE
         base = own.wanted - own.leg
-        slow = k.slow / (1.0 + state.waited / k.patience)
+        slow = price_of_slowing(k.slow, state, k.patience)
         best, best_offset, best_share = math.inf, 0.0, 1.0
         for i in range(_OFFSETS):
             offset = _SPREAD * ((i + 1) // 2) * (1 if i % 2 == 1 else -1)
             for a in range(_SHARES):
                 share = 1.0 - a / (_SHARES - 1)
-                cost = k.turn * abs(offset) + slow * (1.0 - share) + k.change * abs(base + offset - state.last)
+                cost = k.turn * abs(offset) + slow * (1.0 - share) + k.change * abs(wrap(base + offset - state.last))
                 if ruled and 0.0 < abs(offset) < k.apparent:
                     cost += k.timid
                 if found > 0 and cost < best:
                     turn = wrap(own.wanted + offset)
-                    cost += _cost(turn, offset, share * ship.cruise, own, ship, k, targets, found, best - cost)
+                    cost += _cost(turn, offset, share * ship.cruise, own, ship, k, targets, found, arc, best - cost)
                 if cost < best:
                     best, best_offset, best_share = cost, offset, share
             if found == 0:
                 break
         state.last = base + best_offset
-        wait(state, best_offset, ship)
+        wait(state, best_offset, best_share, ship)
         if best_offset != 0.0:
             state.integral = integral  # off the track on purpose
         command(actions[b], ship, own.wanted + best_offset, ship.cruise * best_share)
