@@ -13,10 +13,11 @@ import importlib.metadata
 import json
 import platform
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ..colregs.params import PROFILES
 from ..config import ConfigError, read_yaml, suggestion
 from ..policies import POLICIES, THRUST_LOG, is_custom, make_policy
 from ..policies.custom import source_of
@@ -97,6 +98,8 @@ def plan_campaign(
         raise ConfigError(f"seeds: expected at least 1 from 0 on, got {number} from {first}")
     if step_limit <= 0.0:
         raise ConfigError(f"step limit: expected more than 0 s, got {step_limit:g}")
+    if profile not in PROFILES:
+        raise ConfigError(f"unknown profile {profile!r} of the judge{suggestion(profile, PROFILES)}")
     cases = tuple(replace_case(case, overrides) for case in found.cases)
     for case in cases:
         try:
@@ -307,4 +310,4 @@ def in_order(meta: Mapping[str, Any], rows: list[dict[str, Any]]) -> list[dict[s
     return sorted(rows, key=lambda row: (policy[row["policy"]], case[row["case"]], row["seed"]))
 
 
-__all__ = ["Campaign", "Journal", "in_order", "plan_campaign", "read_campaign", "read_suite", "replace"]
+__all__ = ["Campaign", "Journal", "in_order", "plan_campaign", "read_campaign", "read_suite"]
