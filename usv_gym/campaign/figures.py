@@ -148,7 +148,7 @@ def bearing_rose(encounters: Encounters) -> str:
     sectors, rings = 24, 6
     beta, dcpa = values(encounters, "start_beta_deg") % 360.0, values(encounters, "start_dcpa")
     good = np.isfinite(beta) & np.isfinite(dcpa)
-    far = nice(float(np.percentile(dcpa[good], 95)) if good.any() else 100.0, rings)
+    far = nice(float(max(np.percentile(dcpa[good], 95), 12.0)) if good.any() else 100.0, rings)
     top, rings = far[-1], len(far) - 1
     cx, cy, radius = WIDTH / 2, 176.0, 142.0
     i = (np.round(beta / (360.0 / sectors)).astype(float) % sectors)[good].astype(int)
@@ -243,7 +243,7 @@ def track_plot(film: Mapping[str, Any], contact: bool, closest_to: str) -> str:
     at = int(_gap(own, tracks[near])[1]) if near else len(own) - 1
     # what is drawn: the own ship's whole way, and of the ships what lies near it
     low, high = np.nanmin(own, axis=0), np.nanmax(own, axis=0)
-    span = float(max(high - low)) * 1.15 + 80.0
+    span = float(max(high - low)) * 1.3 + 80.0
     middle = (low + high) / 2
     size = 220.0
 

@@ -220,6 +220,13 @@ class Journal:
     def writing(self) -> Iterator[Any]:
         """A function that appends a result; the line is with the operating system when it returns."""
         with (self.directory / "episodes.jsonl").open("ab", buffering=0) as file:
+            with contextlib.suppress(ImportError):  # no such locks on Windows
+                import fcntl
+
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except OSError:
+                    raise ConfigError(f"{self.directory}: another campaign is being flown into it") from None
 
             def write(result: Result) -> None:
                 row = flat(result)

@@ -182,8 +182,9 @@ def _rate(rate: Mapping[str, Any], *, hit: bool = True) -> str:
     if not rate["n"]:
         return "<td class=zero>-</td>"
     kind = ("hit" if rate["k"] else "zero") if hit else ""
-    return (f'<td class="{kind}">{100 * rate["rate"]:.2f} %<small>{100 * rate["low"]:.2f} to {100 * rate["high"]:.2f}, '
-            f'{rate["k"]:,} of {rate["n"]:,}</small></td>')  # fmt: skip
+    low, high = (f"{100 * rate[side]:.3g}" for side in ("low", "high"))
+    return (f'<td class="{kind}">{100 * rate["rate"]:.3g} %<small>{low} to {high}</small>'
+            f'<small>{rate["k"]:,} of {rate["n"]:,}</small></td>')  # fmt: skip
 
 
 def _level(level: Mapping[str, Any], digits: int = 2) -> str:

@@ -6,6 +6,7 @@ takes its place and the rest of the flight.  Results do not depend on who flew w
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -64,7 +65,8 @@ class _Worker:
 
     def give(self, flight: Flight) -> None:
         self.flight, self.done = flight, set()
-        self.connection.send(flight)
+        with contextlib.suppress(BrokenPipeError):  # it has died: that shows when its answer is read
+            self.connection.send(flight)
 
     def end(self) -> None:
         self.connection.close()
@@ -116,12 +118,17 @@ class Fleet:
             return
         if queue and not is_warm():
             with compiling():  # once, and not in every worker
-                next(self._yard.fly(replace(queue[0], policy="idle", seeds=(0,), witness=None)))
+                for flight in {flight.policy: flight for flight in queue if batched(flight.policy)}.values():
+                    next(self._yard.fly(replace(flight, seeds=(0,))))
         while len(self._workers) < min(self.size, len(queue)):
             self._hire()
         while True:
-            for worker in self._workers:
+            for worker in [*self._workers]:
                 if worker.flight is None and queue:
+                    if not worker.process.is_alive():
+                        worker.end()
+                        self._workers.remove(worker)
+                        worker = self._hire()
                     worker.give(queue.popleft())
             busy = {worker.connection: worker for worker in self._workers if worker.flight is not None}
             if not busy:

@@ -151,7 +151,10 @@ def claim(policy: Mapping[str, Any]) -> str:
     if not c["n"]:
         return "no episode was flown to its end"
     word = "collision" if c["k"] == 1 else "collisions"
-    return f"{c['k']} {word} in {c['n']:,} episodes: the collision probability is below {share(c['below'])} at 95 %"
+    found = f"{c['k']:,} {word} in {c['n']:,} {'episode' if c['n'] == 1 else 'episodes'}"
+    if c["rate"] > 0.1:  # nothing that anyone would want to claim
+        return f"{found}: the collision probability is {100 * c['low']:.0f} to {100 * c['high']:.0f} % (95 %)"
+    return f"{found}: the collision probability is below {share(c['below'])} at 95 %"
 
 
 def share(x: float) -> str:

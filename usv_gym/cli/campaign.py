@@ -56,6 +56,8 @@ def evaluate(
     )  # fmt: skip
     directory = out or Path("runs") / campaign.suite
     console = Console(quiet=quiet)
+    if not console.is_terminal:
+        console.width = 120  # a log may scroll
     try:
         with progress_bar(console) as progress:
             journal = fly(campaign, directory, workers=workers, progress=progress)
