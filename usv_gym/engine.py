@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from .events import run_events
-from .jit import kernel, spliced
+from .jit import lean_kernel, spliced
 from .sensors.nav import navigate
 from .sensors.schedule import first_events, sense
 from .traffic.replay import begin_replay, replay
@@ -92,7 +92,7 @@ def reset_world(w, land, tracks):
     first_events(w)
 
 
-@kernel
+@lean_kernel
 def reset_worlds(worlds, land, tracks, mask):
     """Reset the rows of ``worlds`` [B] where ``mask`` [B] is true; the others are not touched.
 
@@ -104,7 +104,7 @@ def reset_worlds(worlds, land, tracks, mask):
             reset_world(worlds[b], land, tracks)
 
 
-@kernel
+@lean_kernel
 def advance_worlds(worlds, land, tracks, ticks, rows):
     """Advance every world by ``ticks``; ``land`` and ``tracks`` are the pools of ``reset_worlds``.
 
@@ -116,7 +116,7 @@ def advance_worlds(worlds, land, tracks, ticks, rows):
             tick_world(worlds[b], land, tracks, rows, k)
 
 
-@kernel
+@lean_kernel
 def settle_traffic(worlds):
     """Bring the traffic of every world to its present tick (between frames it lags behind)."""
     for b in range(worlds.shape[0]):

@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
-from .jit import inner
-from .trig import sincos_random
+from .jit import scalar
+from .trig import log, sincos_random
 
 # Streams: one per use, never reused.  Each world draws stream x slot x tick.
 WIND, CURRENT, WAVE = 1, 2, 3
@@ -38,33 +38,33 @@ _TO_UNIT = 1.0 / 9007199254740992.0  # 2^-53
 _TO_UNIT32 = 1.0 / 4294967296.0
 
 
-@inner
+@scalar
 def _mix(z):
     z = (z ^ (z >> _S30)) * _M1
     z = (z ^ (z >> _S27)) * _M2
     return z ^ (z >> _S31)
 
 
-@inner
+@scalar
 def bits(seed, stream, slot, tick):
     """64 random bits of a counter: number ``word`` of the SplitMix64 stream ``seed``; slot < 2^20, tick < 2^32."""
     word = (np.uint64(stream) << _STREAM_BITS) | (np.uint64(slot) << _SLOT_BITS) | np.uint64(tick)
     return _mix(np.uint64(seed) + word * _GOLDEN)
 
 
-@inner
+@scalar
 def uniform(seed, stream, slot, tick):
     """One number in [0, 1)."""
     return np.float64(np.int64(bits(seed, stream, slot, tick) >> _S11)) * _TO_UNIT
 
 
-@inner
+@scalar
 def normal2(seed, stream, slot, tick):
     """Two independent standard normal numbers (Box and Muller 1958)."""
     word = bits(seed, stream, slot, tick)
     # half of the bits each: normal numbers up to 6.7 standard deviations
     u = (np.float64(np.int64(word >> _S32)) + 0.5) * _TO_UNIT32
     v = np.float64(np.int64(word & _LOW)) * _TO_UNIT32
-    radius = math.sqrt(-2.0 * math.log(u))
+    radius = math.sqrt(-2.0 * log(u))
     s, c = sincos_random(2.0 * math.pi * v)
     return radius * c, radius * s

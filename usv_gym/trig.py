@@ -1,7 +1,8 @@
-"""Scalar math for the kernels: polynomial sine, cosine and arctangent, and angle wrapping.
+"""Scalar math for the kernels: polynomial sine, cosine, arctangent and logarithm, distances, and angle wrapping.
 
 libm's calls keep LLVM from vectorising a loop and cost about 12 ns each; these are branch-free and cost 1 to 2 ns.
-Coefficients: Moshier's Cephes library (sin.c, atan.c), reduction by Cody and Waite.  Error at most 4.5e-16 for |x| < 1e5.
+Coefficients: Moshier's Cephes library (sin.c) with the reduction by Cody and Waite, error at most 4.5e-16 for |x| < 1e5;
+arctangent and logarithm are those of Sun's fdlibm (s_atan.c, e_log.c), error about one unit in the last place.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 
 import numpy as np
 
-from .jit import inner
+from .jit import scalar
 
 PI = math.pi
 TWO_PI = 2.0 * math.pi
@@ -18,9 +19,12 @@ TWO_PI = 2.0 * math.pi
 _PIO4_1 = 7.85398125648498535156e-1
 _PIO4_2 = 3.77489470793079817668e-8
 _PIO4_3 = 2.69515142907905952645e-15
+_MANTISSA = np.int64(0x000FFFFFFFFFFFFF)
+_ONE = np.int64(0x3FF0000000000000)
+_ABOVE_ROOT = np.int64(0x3FF0000000000000 - 0x3FE6A09E667F3BCD)  # bits of 1 less bits of sqrt(1/2)
 
 
-@inner
+@scalar
 def _octant(x):
     """Sine and cosine of x less the nearest multiple n of pi/2, and n."""
     n = np.floor(x * (2.0 / PI) + 0.5)
@@ -38,7 +42,7 @@ def _octant(x):
     return s, c, np.int64(n)
 
 
-@inner
+@scalar
 def sincos(x):
     """(sin x, cos x) of an angle [rad]."""
     s, c, n = _octant(x)
@@ -51,7 +55,7 @@ def sincos(x):
     return sine, cosine
 
 
-@inner
+@scalar
 def sincos_random(x):
     """The same without a branch, which is slower for angles that change slowly and twice as fast for random ones."""
     s, c, q = _octant(x)
@@ -60,43 +64,65 @@ def sincos_random(x):
     return (1.0 - np.float64(q & 2)) * (keep * s + swap * c), (1.0 - np.float64((q + 1) & 2)) * (keep * c + swap * s)
 
 
-@inner
+@scalar
 def atan2(y, x):
     """Angle [rad] in (-pi, pi] of the point (x, y); 0 for (0, 0)."""
     ax = abs(x)
     ay = abs(y)
-    steep = ay > ax
-    top = ax if steep else ay
-    bottom = ay if steep else ax
-    t = top / bottom if bottom > 0.0 else 0.0
-    far = t > 0.41421356237309503  # tan(pi/8)
-    w = (t - 1.0) / (t + 1.0) if far else t
+    top = min(ax, ay)
+    bottom = max(ax, ay)
+    far = top > 0.41421356237309503 * bottom  # tan(pi/8)
+    w = (top - bottom if far else top) / max(top + bottom if far else bottom, 2.2250738585072014e-308)
     z = w * w
-    p = ((((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z
-          - 1.228866684490136173410e2) * z - 6.485021904942025371773e1)
-    q = (((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z
-          + 4.853903996359136964868e2) * z + 1.945506571482613964425e2)
-    a = w + w * z * p / q
+    u = z * z
+    odd = z * (3.33333333333329318027e-01 + u * (1.42857142725034663711e-01 + u * (9.09088713343650656196e-02
+        + u * (6.66107313738753120669e-02 + u * (4.97687799461593236017e-02 + u * 1.62858201153657823623e-02)))))  # fmt: skip
+    even = u * (-1.99999999998764832476e-01 + u * (-1.11111104054623557880e-01 + u * (-7.69187620504482999495e-02
+        + u * (-5.83357013379057348645e-02 + u * -3.65315727442169155270e-02))))  # fmt: skip
+    a = w - w * (odd + even)
     a = a + 0.25 * PI if far else a
-    a = 0.5 * PI - a if steep else a
+    a = 0.5 * PI - a if ay > ax else a
     a = PI - a if x < 0.0 else a
     return -a if y < 0.0 else a
 
 
-@inner
+@scalar
+def log(x):
+    """Natural logarithm of a positive normal number."""
+    bits = np.float64(x).view(np.int64)
+    # x = 2^k (1 + f) with 1 + f in [sqrt(1/2), sqrt(2))
+    shifted = bits + _ABOVE_ROOT
+    k = np.float64((shifted >> 52) - 1023)
+    f = np.int64((shifted & _MANTISSA) - _ABOVE_ROOT + _ONE).view(np.float64) - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    r = z * (6.666666666666735130e-01 + z * (3.999999999940941908e-01 + z * (2.857142874366239149e-01
+        + z * (2.222219843214978396e-01 + z * (1.818357216161805012e-01 + z * (1.531383769920937332e-01
+        + z * 1.479819860511658591e-01))))))  # fmt: skip
+    half = 0.5 * f * f
+    return k * 6.93147180369123816490e-01 - ((half - (s * (half + r) + k * 1.90821492927058770002e-10)) - f)
+
+
+@scalar
+def hypot(x, y):
+    """Length of a vector; of sizes of which the square is a number."""
+    return math.sqrt(x * x + y * y)
+
+
+@scalar
 def wrap(angle):
     """Angle [rad] wrapped to [-pi, pi)."""
     return angle - TWO_PI * np.floor(angle * (1.0 / TWO_PI) + 0.5)
 
 
-@inner
+@scalar
 def wrap_positive(angle):
     """Angle [rad] wrapped to [0, 2 pi)."""
     a = angle - TWO_PI * np.floor(angle * (1.0 / TWO_PI))
     return 0.0 if a >= TWO_PI else a
 
 
-@inner
+@scalar
 def clip(value, low, high):
     """Value limited to [low, high]."""
     return min(max(value, low), high)

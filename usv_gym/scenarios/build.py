@@ -351,6 +351,7 @@ def _write_sensors(sensors: Sensors, p: Any) -> None:
     p["tdm_period_us"] = _period(tdm.rate)
     p["process_u"], p["process_r"], p["process_time"] = tdm.process_u, tdm.process_r, tdm.process_time
     p["inflation"] = tdm.inflation
+    p["light"], p["light_q"] = tdm.filter == "light", tdm.light_q
     gnss = nav.gnss
     p["gnss_period_us"] = _period(gnss.rate)
     p["gnss_noise"] = gnss.position_std, gnss.heading_std_deg * DEG, gnss.course_std_deg * DEG, gnss.speed_std

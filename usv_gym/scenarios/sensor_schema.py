@@ -195,6 +195,10 @@ class Tdm(Model):
     process_r: Positive = Field(default=3e-8, description="the same of yaw acceleration [(rad/s2)^2/s]")
     process_time: Positive = Field(default=100.0, description="time constant of the slowly varying accelerations [s]")
     inflation: Annotated[float, Field(strict=True, ge=1)] = Field(default=1.0, description="federated inflation")
+    filter: Literal["thesis", "light"] = Field(
+        default="thesis", description="local filters: those of the thesis, or six states at a constant velocity"
+    )
+    light_q: Positive = Field(default=0.003, description="driving noise of `light`: density [(m/s2)^2/s]")
     timeout_factor: Annotated[float, Field(strict=True, ge=1)] = Field(
         default=2.5, description="a sensor is dropped after this many of its expected intervals"
     )

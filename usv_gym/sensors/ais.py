@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import rng
 from ..jit import inner
-from ..trig import wrap, wrap_positive
+from ..trig import atan2, hypot, wrap, wrap_positive
 from ..units import DEG, DEG_PER_MIN, KNOT
 from ..world.state import AIS_ATON, AIS_CLASS_A, AIS_CLASS_B
 from .noise import noise_slot, pair_slot
@@ -128,9 +128,9 @@ def transmit(w, s, tick):
         north, east = v.eta[s, 0], v.eta[s, 1]
         heading = v.eta[s, 2]
         vn, ve = v.velocity[s, 0], v.velocity[s, 1]
-        sog = math.hypot(vn, ve)
+        sog = hypot(vn, ve)
         # a ship at rest has no course of its own: report the heading, as navigation systems do
-        cog = heading + wrap(math.atan2(ve, vn) - heading) if sog > 0.05 else heading
+        cog = heading + wrap(atan2(ve, vn) - heading) if sog > 0.05 else heading
         rot = v.nu[s, 2]
     else:
         north, east = w.obstacles.position[s - V, 0], w.obstacles.position[s - V, 1]

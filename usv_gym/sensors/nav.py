@@ -5,11 +5,9 @@ In a 3-DOF world roll, pitch and heave are zero, so the MRU gives heading and ya
 
 from __future__ import annotations
 
-import math
-
 from .. import rng
 from ..jit import inner
-from ..trig import atan2, sincos, wrap, wrap_positive
+from ..trig import atan2, hypot, sincos, wrap, wrap_positive
 from ..world.geometry import waypoint_reached
 from .ais import next_fire
 
@@ -53,7 +51,7 @@ def navigate(w, tick):
                 drifting = (tick - p.gnss_drift_tick) * w.dt
                 nav.position[o, 0] = v.eta[j, 0] + (p.gnss_drift[0] + p.gnss_drift_rate[0] * drifting) + n0
                 nav.position[o, 1] = v.eta[j, 1] + (p.gnss_drift[1] + p.gnss_drift_rate[1] * drifting) + n1
-                sog = math.hypot(v.velocity[j, 0], v.velocity[j, 1])
+                sog = hypot(v.velocity[j, 0], v.velocity[j, 1])
                 nav.heading[o] = wrap_positive(psi + heading_error)
                 course = atan2(v.velocity[j, 1], v.velocity[j, 0]) if sog > 1.0e-9 else psi
                 nav.course[o] = wrap_positive(course + course_error)
@@ -99,7 +97,7 @@ def _relative_wind(w, j):
     s, c = sincos(w.weather.wind_direction)
     dn = speed * c - w.vessels.velocity[j, 0]
     de = speed * s - w.vessels.velocity[j, 1]
-    strength = math.hypot(dn, de)
+    strength = hypot(dn, de)
     if strength == 0.0:
         return 0.0, 0.0
     return strength, wrap(atan2(-de, -dn) - w.vessels.eta[j, 2])

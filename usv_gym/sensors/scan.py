@@ -12,6 +12,7 @@ import math
 
 from .. import rng
 from ..jit import inner, spliced
+from ..trig import hypot
 from ..world.state import LIDAR, RADAR
 from .clutter import false_alarms
 from .coastline import deliver_land, echo_land, hide_behind_land
@@ -104,7 +105,7 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
         t.measured[o, k, s, 1] = w.nav.position[o, 1] + de
         t.measured[o, k, s, 2] = max(radius + f * er, w.sensors.radius_min)
         # the controller's side knows the measured range only
-        t.measured[o, k, s, 3] = max(sensor.gain * math.hypot(dn, de), sensor.gain_floor)
+        t.measured[o, k, s, 3] = max(sensor.gain * hypot(dn, de), sensor.gain_floor)
         t.measured_us[o, k, s] = now
     echo_land(w, land, o, k, sensor, reach, tick, count, stream_land, stream_land + 1)
     if w.clutter:

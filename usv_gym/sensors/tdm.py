@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from ..jit import inner
-from ..trig import PI, wrap_positive
+from ..trig import PI, atan2, hypot, wrap_positive
 from ..world.state import (
     AIS,
     AIS_ATON,
@@ -26,9 +26,10 @@ from ..world.state import (
     PHASE_POSITION,
     RADAR,
 )
+from . import light
 from .ais import ais_class, reporting_interval_us
 from .coastline import publish_land
-from .ekf import init_scan_motion, init_size, predict_size, update_size
+from .ekf import init_fix, init_scan_motion, init_size, predict_size, update_size
 from .fusion import fuse, fuse_size
 from .tracker import MOVING, predicted, track_ais, track_scan
 
@@ -40,7 +41,7 @@ def _timeout_us(w, o, s, sensor):
     if sensor == LIDAR:
         return w.sensors.lidar.timeout_us
     # as slow as the station may be, given the error of its SOG: a moored one reports seldom, and not always 0
-    slowest = w.ais.inbox[o, s, 4] - 3.0 * math.hypot(w.sensors.ais_noise[4], w.sensors.ais_bias[4])
+    slowest = w.ais.inbox[o, s, 4] - 3.0 * hypot(w.sensors.ais_noise[4], w.sensors.ais_bias[4])
     interval = reporting_interval_us(ais_class(w, s), max(slowest, 0.0), 0.0, w.sensors.ais_interval_us)
     return w.sensors.ais_timeout * interval
 
@@ -70,6 +71,13 @@ def _fused(w, o, s, now_us):
         if other == PHASE_NONE:
             continue
         seconds = (now_us - t.stamp_us[o, s, k]) * 1.0e-6
+        if w.sensors.light:
+            if k == AIS:
+                light.predicted(t.x_ais[o, s], t.p_ais[o, s], other, seconds, w.sensors, y, q)
+            else:
+                light.predicted(t.x_scan[o, k - 1, s], t.p_scan[o, k - 1, s], other, seconds, w.sensors, y, q)
+            phase = light.fuse(x, p, phase, y, q, other)
+            continue
         if k == AIS:
             predicted(t.x_ais[o, s], t.p_ais[o, s], other, seconds, w.sensors, y, q)
         else:
@@ -133,7 +141,7 @@ def take_scan(w, o, k, s, scan):
     fresh = phase == PHASE_NONE
     if phase == PHASE_POSITION:
         # f(d) at the range of the estimate: by their own, fixes that are too near count for more and pull the target nearer
-        f = max(scan.gain * math.hypot(x[0] - w.nav.position[o, 0], x[1] - w.nav.position[o, 1]), scan.gain_floor)
+        f = max(scan.gain * hypot(x[0] - w.nav.position[o, 0], x[1] - w.nav.position[o, 1]), scan.gain_floor)
     t.phase[o, s, k + 1] = PHASE_NONE if fresh else phase
     started = False
     if phase != PHASE_MOTION and (t.phase[o, s, AIS] != PHASE_NONE or t.phase[o, s, 2 - k] != PHASE_NONE):
@@ -144,7 +152,13 @@ def take_scan(w, o, k, s, scan):
         known = _fused(w, o, s, stamp)
         t.phase[o, s, k + 1] = own_phase
         y, q = w.estimate_x[0], w.estimate_p[0]
-        if known == PHASE_MOTION and y[3] > 0.0 and y[3] * y[3] > MOVING * MOVING * q[9]:
+        if w.sensors.light:
+            if known == PHASE_MOTION and light.speed2(y) > MOVING * MOVING * q[2]:
+                init_fix(x, p, n, e, f, scan.noise[0], scan.bias[0])
+                light.start(x, p, y[2], y[3], q[2], 0.0)
+                phase = PHASE_MOTION
+                started = True
+        elif known == PHASE_MOTION and y[3] > 0.0 and y[3] * y[3] > MOVING * MOVING * q[9]:
             init_scan_motion(x, p, n, e, f, y[2], y[3], y[4], q[5], q[9], q[14], w.sensors, scan)
             phase = PHASE_MOTION
             started = True
@@ -194,13 +208,20 @@ def publish(w, land, o, tick):
         pic.radius[o, s] = max(radius, w.sensors.radius_min) if radius == radius else radius
         pic.radius_variance[o, s] = variance
         pic.covariance[o, s, 0] = p[0]
-        pic.covariance[o, s, 1] = p[1]
-        pic.covariance[o, s, 2] = p[2]
+        pic.covariance[o, s, 1] = 0.0 if w.sensors.light else p[1]
+        pic.covariance[o, s, 2] = p[0] if w.sensors.light else p[2]
         moving = phase == PHASE_MOTION
         station = t.phase[o, s, AIS] != PHASE_NONE and ais_class(w, s) != AIS_ATON
         pic.motion_known[o, s] = moving
         pic.descriptor[o, s] = DESCRIPTOR_VESSEL if moving or station else DESCRIPTOR_FIXED
-        if moving:
+        if moving and w.sensors.light:
+            speed2 = light.speed2(x)
+            pic.cog[o, s] = wrap_positive(atan2(x[3], x[2]))
+            pic.sog[o, s] = math.sqrt(speed2)
+            pic.rot[o, s] = math.nan
+            pic.covariance[o, s, 3] = p[2] / max(speed2, p[2])
+            pic.covariance[o, s, 4] = p[2]
+        elif moving:
             astern = x[3] < 0.0
             pic.cog[o, s] = wrap_positive(x[2] + PI if astern else x[2])
             pic.sog[o, s] = abs(x[3])

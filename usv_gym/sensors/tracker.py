@@ -1,7 +1,7 @@
 """What a local filter knows of a target: position only, or position and motion.
 
 PHASE_POSITION  the static filter of ``ekf``: an iceberg's fixes are averaged; heading and speed are unknown
-PHASE_MOTION    the extended Kalman filter
+PHASE_MOTION    the extended Kalman filter, or with ``sensors.light`` the filter of ``light``
 
 A radar or LiDAR cannot tell (psi, u) from (psi + 180 deg, -u), and an EKF that starts with an unknown heading ends up
 reversed in a fifth to a half of the runs.  So motion starts from a line through the fixes ("two-point initialisation"),
@@ -30,7 +30,7 @@ import numpy as np
 from ..jit import inner
 from ..trig import PI, atan2
 from ..world.state import PHASE_MOTION, PHASE_POSITION
-from . import ekf
+from . import ekf, light
 from .motion import predict_motion, start_motion
 
 #: Time constant of forgetting in the line fit [s]
@@ -52,10 +52,16 @@ def track_ais(x, P, phase, h, n, e, psi, u, r, sensors):
     (an aid to navigation) stays in PHASE_POSITION.
     """
     if phase == PHASE_MOTION:
-        ekf.predict_ais(x, P, h, sensors)
-        ekf.update_ais(x, P, n, e, psi, u, r, sensors)
+        if sensors.light:
+            light.track_ais(x, P, h, n, e, psi, u, sensors)
+        else:
+            ekf.predict_ais(x, P, h, sensors)
+            ekf.update_ais(x, P, n, e, psi, u, r, sensors)
     elif not (np.isnan(psi) or np.isnan(u)):
-        ekf.init_ais(x, P, n, e, psi, u, r, sensors)
+        if sensors.light:
+            light.init_ais(x, P, n, e, psi, u, sensors)
+        else:
+            ekf.init_ais(x, P, n, e, psi, u, r, sensors)
         phase = PHASE_MOTION
     elif phase == PHASE_POSITION:
         ekf.predict_position(x, P, h, sensors.ais_bias[0], sensors.ais_bias_time[0])
@@ -73,11 +79,16 @@ def track_scan(x, P, start, phase, h, n, e, f, sensors, scan):
     h [s] is the time since the filter's time of validity, of no account in PHASE_NONE.
     """
     if phase == PHASE_MOTION:
-        ekf.predict_scan(x, P, h, sensors, scan)
-        ekf.update_scan(x, P, n, e, f, scan)
-        fold(x, P)
-        if x[3] * x[3] < STOPPED * STOPPED * P[9]:
-            ekf.init_position(x, P, x[0], x[1], max(P[0], P[2]), 0.0, scan.bias[0])
+        if sensors.light:
+            light.track_scan(x, P, h, n, e, f, sensors, scan)
+            stopped = light.speed2(x) < STOPPED * STOPPED * P[2]
+        else:
+            ekf.predict_scan(x, P, h, sensors, scan)
+            ekf.update_scan(x, P, n, e, f, scan)
+            fold(x, P)
+            stopped = x[3] * x[3] < STOPPED * STOPPED * P[9]
+        if stopped:
+            ekf.init_position(x, P, x[0], x[1], P[0] if sensors.light else max(P[0], P[2]), 0.0, scan.bias[0])
             start_line(start, n, e, f, scan)
             phase = PHASE_POSITION
     elif phase == PHASE_POSITION:
@@ -176,6 +187,9 @@ def _start_motion(x, P, start, sensors):
     """
     age, variance = -start[4], 1.0 / start[5]
     north, east = start[8] * variance, start[9] * variance
+    if sensors.light:
+        light.start(x, P, north, east, variance, age)
+        return
     u = math.sqrt(north * north + east * east)
     yaw_rate = ekf.YAW_RATE * ekf.YAW_RATE * sensors.inflation
     start_motion(x, P, atan2(east, north), u, 0.0, variance / (u * u), variance, yaw_rate, sensors)

@@ -9,7 +9,7 @@ import math
 
 from ..jit import inner
 from ..sensors.ais import ais_class
-from ..trig import PI, TWO_PI, atan2, clip, sincos, wrap
+from ..trig import PI, TWO_PI, atan2, clip, hypot, sincos, sincos_random, wrap
 from ..world.shore import coast, nearest_land
 from ..world.state import AIS_ATON, DESCRIPTOR_VESSEL, L
 from .task import N_OWN, N_TARGET, OBS_AIS, OBS_SECTORS, OBS_TRACKS, OBS_TRUTH
@@ -19,7 +19,7 @@ from .task import N_OWN, N_TARGET, OBS_AIS, OBS_SECTORS, OBS_TRACKS, OBS_TRUTH
 def cross_track_error(ax, ay, bx, by, n, e):
     """Signed distance [m] of a point from the line a -> b, + to starboard of its direction."""
     dn, de = bx - ax, by - ay
-    length = math.hypot(dn, de)
+    length = hypot(dn, de)
     return (dn * (e - ay) - de * (n - ax)) / length if length > 0.0 else 0.0
 
 
@@ -48,7 +48,7 @@ def observe_own(w, o, task, north, east, heading, u, v, r, leg, obs):
             course = atan2(we - ae, wn - an)
             obs[5] = clip(cross_track_error(an, ae, wn, we, north, east) / task.cross_track_scale, -1.0, 1.0)
     obs[3], obs[4] = sincos(course - heading)
-    obs[6] = clip(math.hypot(dn, de) / task.distance_scale, 0.0, 1.0)
+    obs[6] = clip(hypot(dn, de) / task.distance_scale, 0.0, 1.0)
     obs[7], obs[8] = sincos(bearing - heading)
     if k + 1 < count:
         following = atan2(route.waypoint[j, k + 1, 1] - we, route.waypoint[j, k + 1, 0] - wn)
@@ -58,49 +58,91 @@ def observe_own(w, o, task, north, east, heading, u, v, r, leg, obs):
 
 
 @inner
-def _target(task, out, dn, de, vn, ve, heading_s, heading_c, known, radius, spread, vessel):
-    """One target's features, turned into {b}."""
-    out[0] = 1.0
-    out[1] = clip((heading_c * dn + heading_s * de) / task.range_scale, -1.0, 1.0)
-    out[2] = clip((heading_c * de - heading_s * dn) / task.range_scale, -1.0, 1.0)
+def _target(task, obs, at, dn, de, vn, ve, heading_s, heading_c, known, radius, spread, vessel):
+    """One target's features, turned into {b}, into obs from ``at`` on."""
+    obs[at] = 1.0
+    obs[at + 1] = clip((heading_c * dn + heading_s * de) / task.range_scale, -1.0, 1.0)
+    obs[at + 2] = clip((heading_c * de - heading_s * dn) / task.range_scale, -1.0, 1.0)
     if known:
-        out[3] = clip((heading_c * vn + heading_s * ve) / task.target_speed_scale, -1.0, 1.0)
-        out[4] = clip((heading_c * ve - heading_s * vn) / task.target_speed_scale, -1.0, 1.0)
-        out[5] = 1.0
+        obs[at + 3] = clip((heading_c * vn + heading_s * ve) / task.target_speed_scale, -1.0, 1.0)
+        obs[at + 4] = clip((heading_c * ve - heading_s * vn) / task.target_speed_scale, -1.0, 1.0)
+        obs[at + 5] = 1.0
     else:
-        out[3] = out[4] = out[5] = 0.0
-    out[6] = clip(radius / task.radius_scale, 0.0, 1.0) if radius == radius else 0.0
-    out[7] = clip(spread, 0.0, 1.0)
-    out[8] = 1.0 if vessel else 0.0
+        obs[at + 3] = obs[at + 4] = obs[at + 5] = 0.0
+    obs[at + 6] = clip(radius / task.radius_scale, 0.0, 1.0) if radius == radius else 0.0
+    obs[at + 7] = clip(spread, 0.0, 1.0)
+    obs[at + 8] = 1.0 if vessel else 0.0
 
 
 @inner
-def _keep_nearest(w, found, s, distance, keep):
-    """Insert source s into the ``keep`` nearest in w.order / w.ranges; returns how many there are now."""
-    w.ranges[s] = distance
-    k = found
-    while k > 0 and w.ranges[w.order[k - 1]] > distance:
-        if k < keep:
+def _ranges_of_truth(w, own, north, east):
+    """Write the distance [m] of every source, less its radius, to a place into ``w.ranges``; inf for those that are not.
+
+    Without a branch, as the two that follow, so that they become vector code.
+    """
+    v, m = w.vessels, w.obstacles
+    V = v.active.shape[0]
+    for s in range(V):
+        distance = hypot(v.eta[s, 0] - north, v.eta[s, 1] - east)
+        there = (v.active[s] != 0) & (s != own)
+        w.ranges[s] = distance - 0.5 * max(v.length[s], v.beam[s]) if there else math.inf
+    for i in range(m.active.shape[0]):
+        distance = hypot(m.position[i, 0] - north, m.position[i, 1] - east)
+        w.ranges[V + i] = distance - m.radius[i] if m.active[i] != 0 else math.inf
+
+
+@inner
+def _ranges_of_ais(w, o, north, east):
+    """The same, of the sources that were heard on AIS."""
+    a = w.ais
+    for s in range(w.ranges.shape[0]):
+        distance = hypot(a.inbox[o, s, 0] - north, a.inbox[o, s, 1] - east)
+        w.ranges[s] = distance if a.inbox_stamp_us[o, s] >= 0 else math.inf
+
+
+@inner
+def _ranges_of_tracks(w, o, north, east, lag):
+    """The same, of the detected targets, ``lag`` seconds after they were reported."""
+    pic = w.picture
+    for s in range(w.ranges.shape[0]):
+        sine, cosine = sincos_random(pic.cog[o, s])
+        way = pic.sog[o, s] * lag
+        known = pic.motion_known[o, s] != 0
+        dn = pic.position[o, s, 0] - north + (way * cosine if known else 0.0)
+        de = pic.position[o, s, 1] - east + (way * sine if known else 0.0)
+        radius = pic.radius[o, s] if pic.radius[o, s] == pic.radius[o, s] else 0.0
+        w.ranges[s] = hypot(dn, de) - radius if pic.id[o, s] != 0 else math.inf
+
+
+@inner
+def _nearest(w, keep):
+    """Put the ``keep`` sources of least ``w.ranges`` in order into ``w.order``, of equals the lower; returns how many."""
+    found = 0
+    farthest = math.inf
+    for s in range(w.ranges.shape[0]):
+        distance = w.ranges[s]
+        if distance >= farthest:
+            continue
+        k = min(found, keep - 1)
+        while k > 0 and w.ranges[w.order[k - 1]] > distance:
             w.order[k] = w.order[k - 1]
-        k -= 1
-    if k < keep:
+            k -= 1
         w.order[k] = s
-        return min(found + 1, keep)
+        found = min(found + 1, keep)
+        if found == keep:
+            farthest = w.ranges[w.order[keep - 1]]
     return found
 
 
 @inner
 def observe(w, land, o, task, obs):
     """Write the flat observation of observer o into obs [size], float32."""
-    nav, pic = w.nav, w.picture
+    nav, pic, v = w.nav, w.picture, w.vessels
     own = w.observer[o]
-    V = w.vessels.active.shape[0]
-    S = V + w.obstacles.active.shape[0]
-    truth = task.observation == OBS_TRUTH
-    if truth:
-        north, east, heading = w.vessels.eta[own, 0], w.vessels.eta[own, 1], w.vessels.eta[own, 2]
-        observe_own(w, o, task, north, east, heading, w.vessels.nu[own, 0], w.vessels.nu[own, 1], w.vessels.nu[own, 2],
-                    w.routes.leg[own], obs)  # fmt: skip
+    V = v.active.shape[0]
+    if task.observation == OBS_TRUTH:
+        north, east, heading = v.eta[own, 0], v.eta[own, 1], v.eta[own, 2]
+        observe_own(w, o, task, north, east, heading, v.nu[own, 0], v.nu[own, 1], v.nu[own, 2], w.routes.leg[own], obs)
     else:
         age = (w.tick * w.dt_us - nav.gnss_stamp_us[o]) * 1.0e-6
         heading = nav.mru_heading[o]
@@ -109,62 +151,34 @@ def observe(w, land, o, task, obs):
         east = nav.position[o, 1] + nav.sog[o] * cs * age
         observe_own(w, o, task, north, east, heading, nav.water_speed[o, 0], nav.water_speed[o, 1], nav.yaw_rate[o],
                     nav.leg[o], obs)  # fmt: skip
-    sectors = task.observation == OBS_SECTORS
-    if sectors:
+    if task.observation == OBS_SECTORS:
         for i in range(N_OWN, N_OWN + task.sectors):
             obs[i] = 0.0
     if w.land_id >= 0 or w.chart_id >= 0 or task.land > 0:
         _observe_land(w, land, o, task, north, east, heading, obs)
-    hs, hc = sincos(heading)
     lag = (w.tick - pic.tick[o]) * w.dt
-    found = 0
-    for s in range(S):
-        if task.observation == OBS_TRACKS or sectors:
-            if pic.id[o, s] == 0:
-                continue
-            dn, de = pic.position[o, s, 0] - north, pic.position[o, s, 1] - east
-            radius = pic.radius[o, s] if pic.radius[o, s] == pic.radius[o, s] else 0.0
-            if pic.motion_known[o, s]:
-                ts, tc = sincos(pic.cog[o, s])
-                dn += pic.sog[o, s] * tc * lag
-                de += pic.sog[o, s] * ts * lag
-        elif task.observation == OBS_AIS:
-            if w.ais.inbox_stamp_us[o, s] < 0:
-                continue
-            dn, de = w.ais.inbox[o, s, 0] - north, w.ais.inbox[o, s, 1] - east
-            radius = 0.0
-        else:
-            active = w.vessels.active[s] if s < V else w.obstacles.active[s - V]
-            if active == 0 or s == own:
-                continue
-            if s < V:
-                dn, de = w.vessels.eta[s, 0] - north, w.vessels.eta[s, 1] - east
-                radius = 0.5 * max(w.vessels.length[s], w.vessels.beam[s])
-            else:
-                dn, de = w.obstacles.position[s - V, 0] - north, w.obstacles.position[s - V, 1] - east
-                radius = w.obstacles.radius[s - V]
-        distance = math.hypot(dn, de)
-        if sectors:
-            half = PI if distance <= radius else math.asin(radius / distance)
-            gap = max(distance - radius, 0.0)
-            _shade_sectors(obs, N_OWN, task.sectors, wrap(atan2(de, dn) - heading), half, 1.0 - gap / task.range_scale)
-        else:
-            found = _keep_nearest(w, found, s, distance - radius, task.targets)
-    if sectors:
+    if task.observation == OBS_SECTORS:
+        _observe_sectors(w, o, task, north, east, heading, lag, obs)
         return
-    for i in range(task.targets):
-        out = obs[N_OWN + i * N_TARGET : N_OWN + (i + 1) * N_TARGET]
-        if i >= found:
-            for f in range(N_TARGET):
-                out[f] = 0.0
-            continue
+    if task.observation == OBS_TRUTH:
+        _ranges_of_truth(w, own, north, east)
+    elif task.observation == OBS_AIS:
+        _ranges_of_ais(w, o, north, east)
+    else:
+        _ranges_of_tracks(w, o, north, east, lag)
+    found = _nearest(w, task.targets)
+    hs, hc = sincos(heading)
+    for i in range(N_OWN + found * N_TARGET, N_OWN + task.targets * N_TARGET):
+        obs[i] = 0.0
+    for i in range(found):
         s = w.order[i]
+        at = N_OWN + i * N_TARGET
         if task.observation == OBS_TRACKS:
             vn = ve = 0.0
             if pic.motion_known[o, s]:
                 ts, tc = sincos(pic.cog[o, s])
                 vn, ve = pic.sog[o, s] * tc, pic.sog[o, s] * ts
-            _target(task, out, pic.position[o, s, 0] + vn * lag - north, pic.position[o, s, 1] + ve * lag - east, vn, ve,
+            _target(task, obs, at, pic.position[o, s, 0] + vn * lag - north, pic.position[o, s, 1] + ve * lag - east, vn, ve,
                     hs, hc, pic.motion_known[o, s], pic.radius[o, s],
                     math.sqrt(0.5 * (pic.covariance[o, s, 0] + pic.covariance[o, s, 2])) / task.radius_scale,
                     pic.descriptor[o, s] == DESCRIPTOR_VESSEL)  # fmt: skip
@@ -176,17 +190,34 @@ def observe(w, land, o, task, obs):
                 ts, tc = sincos(box[2])
                 vn, ve = box[4] * tc, box[4] * ts
             age = (w.tick * w.dt_us - w.ais.inbox_stamp_us[o, s]) * 1.0e-6
-            _target(task, out, box[0] - north, box[1] - east, vn, ve, hs, hc, known, 0.0, age / 60.0,
+            _target(task, obs, at, box[0] - north, box[1] - east, vn, ve, hs, hc, known, 0.0, age / 60.0,
                     ais_class(w, s) != AIS_ATON)  # fmt: skip
         elif s < V:
-            _target(task, out, w.vessels.eta[s, 0] - north, w.vessels.eta[s, 1] - east, w.vessels.velocity[s, 0],
-                    w.vessels.velocity[s, 1], hs, hc, True, 0.5 * max(w.vessels.length[s], w.vessels.beam[s]), 0.0,
-                    True)  # fmt: skip
+            _target(task, obs, at, v.eta[s, 0] - north, v.eta[s, 1] - east, v.velocity[s, 0], v.velocity[s, 1], hs, hc, True,
+                    0.5 * max(v.length[s], v.beam[s]), 0.0, True)  # fmt: skip
         else:
-            i_m = s - V
-            _target(task, out, w.obstacles.position[i_m, 0] - north, w.obstacles.position[i_m, 1] - east,
-                    w.obstacles.velocity[i_m, 0], w.obstacles.velocity[i_m, 1], hs, hc, True, w.obstacles.radius[i_m], 0.0,
-                    False)  # fmt: skip
+            m, k = w.obstacles, s - V
+            _target(task, obs, at, m.position[k, 0] - north, m.position[k, 1] - east, m.velocity[k, 0], m.velocity[k, 1],
+                    hs, hc, True, m.radius[k], 0.0, False)  # fmt: skip
+
+
+@inner
+def _observe_sectors(w, o, task, north, east, heading, lag, obs):
+    """Shade the bearing sectors of the observation with the detected targets."""
+    pic = w.picture
+    for s in range(w.ranges.shape[0]):
+        if pic.id[o, s] == 0:
+            continue
+        dn, de = pic.position[o, s, 0] - north, pic.position[o, s, 1] - east
+        radius = pic.radius[o, s] if pic.radius[o, s] == pic.radius[o, s] else 0.0
+        if pic.motion_known[o, s]:
+            ts, tc = sincos(pic.cog[o, s])
+            dn += pic.sog[o, s] * tc * lag
+            de += pic.sog[o, s] * ts * lag
+        distance = hypot(dn, de)
+        half = PI if distance <= radius else math.asin(radius / distance)
+        gap = max(distance - radius, 0.0)
+        _shade_sectors(obs, N_OWN, task.sectors, wrap(atan2(de, dn) - heading), half, 1.0 - gap / task.range_scale)
 
 
 @inner
@@ -230,7 +261,7 @@ def _observe_land(w, land, o, task, north, east, heading, obs):
         points = pic.chart[o] if chart else pic.land[o]
         for i in range(L):
             dn, de = points[i, 0] - north, points[i, 1] - east
-            distance = math.hypot(dn, de)
+            distance = hypot(dn, de)
             if distance == distance:
                 bearing, closeness = wrap(atan2(de, dn) - heading), 1.0 - distance / task.range_scale
                 if n > 0:

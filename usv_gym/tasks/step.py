@@ -6,9 +6,9 @@ import math
 
 from ..colregs.duty import rule_terms
 from ..engine import reset_world, tick_world
-from ..jit import inner, kernel, spliced
+from ..jit import inner, lean_kernel, spliced
 from ..traffic.ships import move_traffic
-from ..trig import clip, wrap
+from ..trig import clip, hypot, wrap
 from ..units import DEG
 from ..world.autopilot import autopilot, mix
 from .observe import cross_track_error, observe
@@ -25,9 +25,9 @@ def distance_to_go(w, j):
     if r.count[j] == 0 or r.done[j]:
         return 0.0
     k = r.leg[j]
-    total = math.hypot(r.waypoint[j, k, 0] - w.vessels.eta[j, 0], r.waypoint[j, k, 1] - w.vessels.eta[j, 1])
+    total = hypot(r.waypoint[j, k, 0] - w.vessels.eta[j, 0], r.waypoint[j, k, 1] - w.vessels.eta[j, 1])
     for i in range(k + 1, r.count[j]):
-        total += math.hypot(r.waypoint[j, i, 0] - r.waypoint[j, i - 1, 0], r.waypoint[j, i, 1] - r.waypoint[j, i - 1, 1])
+        total += hypot(r.waypoint[j, i, 0] - r.waypoint[j, i - 1, 0], r.waypoint[j, i, 1] - r.waypoint[j, i - 1, 1])
     return total
 
 
@@ -154,6 +154,9 @@ def step_task(w, land, tracks, tasks, episodes, rows):
     """
     O = w.observer.shape[0]
     piloted = tasks[0].action != ACTION_DEMAND and tasks[0].action != ACTION_CHANNELS
+    if w.sensors.exteroceptive == 0 and not piloted:
+        # nobody reads the own navigation before the step is over, so it is not measured before
+        w.next_nav = max(w.next_nav, w.tick + tasks[0].control_ticks)
     for o in range(O):
         own = w.observer[o]
         w.safety.step_closest[o] = math.inf
@@ -190,7 +193,7 @@ def _possible(task, action):
     return True
 
 
-@kernel
+@lean_kernel
 def run_batch(worlds, land, tracks, tasks, episodes, obs, rows):
     """Begin an episode in the rows that ask for BEGIN, make a control step in those that ask for STEP, leave the others.
 
@@ -218,7 +221,7 @@ def run_batch(worlds, land, tracks, tasks, episodes, obs, rows):
     return -1
 
 
-@kernel
+@lean_kernel
 def observe_batch(worlds, land, tasks, obs):
     """Write the observations [B, O, size] that the records hold now; reads nothing but navigation and picture."""
     for b in range(worlds.shape[0]):

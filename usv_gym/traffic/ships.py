@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ..jit import inner
-from ..trig import TWO_PI, atan2, clip, sincos, wrap
+from ..trig import TWO_PI, atan2, clip, sincos_random, wrap
 from ..world.geometry import waypoint_reached
 from ..world.state import (
     AFTER_CONTINUE,
@@ -23,6 +23,9 @@ from ..world.state import (
 from .pilots import pilot
 
 DEAD_BAND = 2.0 * math.pi / 180.0  #: [rad] of the original's constant-rate turn
+MANY_TURNS = 1.0e4 * TWO_PI  #: [rad] a heading is wrapped beyond
+#: what a ship of ``steer_how`` does: not steered here, goes straight on, turns to ``steer_heading``, towards a point
+NOWHERE, STRAIGHT, TO_HEADING, TO_POINT = 0, 1, 2, 3
 
 
 @inner
@@ -45,41 +48,65 @@ def follow_route(w, j):
 
 
 @inner
-def steer(w, seconds):
-    """Decide turn and speed of every kinematic ship for a frame of this many seconds."""
+def _decide(w, seconds):
+    """Write where every kinematic ship wants to go: ``steer_how``, where to and ``steer_speed``."""
     v, r = w.vessels, w.routes
     for j in range(v.active.shape[0]):
+        w.steer_how[j] = NOWHERE
         if v.active[j] == 0 or v.model[j] != MODEL_KINEMATIC or v.behaviour[j] == BEHAVIOUR_REPLAY:
             continue
-        psi = v.eta[j, 2]
-        speed = v.speed[j]
-        wanted = psi
+        w.steer_speed[j] = v.speed[j]
         if v.controlled[j] or v.behaviour[j] == BEHAVIOUR_HOLD:
-            wanted = v.heading_set[j]
+            w.steer_how[j] = TO_HEADING
+            w.steer_heading[j] = v.heading_set[j]
         else:
+            w.steer_how[j] = STRAIGHT
             follow_route(w, j)
             if r.done[j] == 0 and r.leg[j] < r.count[j]:
                 k = r.leg[j]
-                wanted = atan2(r.waypoint[j, k, 1] - v.eta[j, 1], r.waypoint[j, k, 0] - v.eta[j, 0])
+                w.steer_how[j] = TO_POINT
+                w.steer_north[j] = r.waypoint[j, k, 0] - v.eta[j, 0]
+                w.steer_east[j] = r.waypoint[j, k, 1] - v.eta[j, 1]
             elif r.count[j] > 0 and r.after_last[j] != AFTER_CONTINUE:
-                speed = 0.0
+                w.steer_speed[j] = 0.0
             if v.behaviour[j] >= BEHAVIOUR_COLREGS:
-                wanted, speed = pilot(w, j, wanted, speed, seconds)
+                wanted = v.eta[j, 2]
+                if w.steer_how[j] == TO_POINT:
+                    wanted = atan2(w.steer_east[j], w.steer_north[j])
+                w.steer_how[j] = TO_HEADING
+                w.steer_heading[j], w.steer_speed[j] = pilot(w, j, wanted, w.steer_speed[j], seconds)
+        w.steer_speed[j] += v.speed_hold[j] * (v.nu[j, 0] - w.steer_speed[j])
+
+
+@inner
+def steer(w, seconds):
+    """Decide turn and speed of every kinematic ship for a frame of this many seconds."""
+    _decide(w, seconds)
+    v = w.vessels
+    per_second = 1.0 / seconds
+    for j in range(v.active.shape[0]):  # without a branch, so that it becomes vector code
+        how = w.steer_how[j]
+        psi = v.eta[j, 2]
+        wanted = atan2(w.steer_east[j], w.steer_north[j]) if how == TO_POINT else psi
+        wanted = w.steer_heading[j] if how == TO_HEADING else wanted
         error = wrap(wanted - psi)
         limit = v.turn_rate_max[j] * seconds
-        if v.turn_constant[j]:
-            turn = 0.0 if abs(error) < DEAD_BAND else clip(error, -limit, limit)
-        else:
-            turn = clip(error * v.turn_decay[j], -limit, limit)
-        speed += v.speed_hold[j] * (v.nu[j, 0] - speed)
-        if speed == 0.0:
-            turn = 0.0
-        s, c = sincos(psi + 0.5 * turn)
-        v.nu[j, 0] = speed
-        v.nu[j, 1] = 0.0
-        v.nu[j, 2] = turn / seconds
-        v.velocity[j, 0] = speed * c
-        v.velocity[j, 1] = speed * s
+        lagged = clip(error * v.turn_decay[j], -limit, limit)
+        steady = 0.0 if abs(error) < DEAD_BAND else clip(error, -limit, limit)
+        turn = steady if v.turn_constant[j] != 0 else lagged
+        speed = w.steer_speed[j]
+        turn = 0.0 if speed == 0.0 else turn
+        s, c = sincos_random(psi + 0.5 * turn)
+        w.steered_rate[j] = turn * per_second
+        w.steered_velocity[0, j] = speed * c
+        w.steered_velocity[1, j] = speed * s
+    for j in range(v.active.shape[0]):
+        if w.steer_how[j] != NOWHERE:
+            v.nu[j, 0] = w.steer_speed[j]
+            v.nu[j, 1] = 0.0
+            v.nu[j, 2] = w.steered_rate[j]
+            v.velocity[j, 0] = w.steered_velocity[0, j]
+            v.velocity[j, 1] = w.steered_velocity[1, j]
 
 
 @inner
@@ -91,15 +118,16 @@ def move_traffic(w, tick):
     w.traffic_tick = tick
     v, m = w.vessels, w.obstacles
     for j in range(v.active.shape[0]):
-        if v.active[j] and v.model[j] == MODEL_KINEMATIC:
-            v.eta[j, 0] += v.velocity[j, 0] * seconds
-            v.eta[j, 1] += v.velocity[j, 1] * seconds
-            v.eta[j, 2] += v.nu[j, 2] * seconds
-            if abs(v.eta[j, 2]) > 1.0e4 * TWO_PI:  # a ship on a loop for weeks
-                v.eta[j, 2] = wrap(v.eta[j, 2])
-            v.distance[j] += abs(v.nu[j, 0]) * seconds
+        h = seconds if (v.active[j] != 0) & (v.model[j] == MODEL_KINEMATIC) else 0.0
+        v.eta[j, 0] += v.velocity[j, 0] * h
+        v.eta[j, 1] += v.velocity[j, 1] * h
+        psi = v.eta[j, 2] + v.nu[j, 2] * h
+        v.eta[j, 2] = wrap(psi) if abs(psi) > MANY_TURNS else psi  # a ship on a loop for weeks
+    for j in range(v.active.shape[0]):
+        h = seconds if (v.active[j] != 0) & (v.model[j] == MODEL_KINEMATIC) else 0.0
+        v.distance[j] += abs(v.nu[j, 0]) * h
     cn, ce = w.weather.current[0], w.weather.current[1]
     for i in range(m.active.shape[0]):
-        if m.active[i]:
-            m.position[i, 0] += (m.velocity[i, 0] + m.drifts[i] * cn) * seconds
-            m.position[i, 1] += (m.velocity[i, 1] + m.drifts[i] * ce) * seconds
+        h = seconds if m.active[i] != 0 else 0.0
+        m.position[i, 0] += (m.velocity[i, 0] + m.drifts[i] * cn) * h
+        m.position[i, 1] += (m.velocity[i, 1] + m.drifts[i] * ce) * h

@@ -107,7 +107,7 @@ def _realise(weather):
 
 @inner
 def wind_load(w, j, p, sine, cosine):
-    """Wind force on vessel slot j with plant p at heading (sine, cosine): writes ``tau_wind`` and ``wind_relative``.
+    """Wind force on vessel slot j with plant p at heading (sine, cosine): writes ``tau_wind``.
 
     Coefficients after Blendermann (1994), in the form of Fossen (2021), section 10.1; see ``docs/vessels.md``.
     """
@@ -123,14 +123,12 @@ def wind_load(w, j, p, sine, cosine):
     u = w.vessels.nu[j, 0] - (cosine * wind_n + sine * wind_e)
     v = w.vessels.nu[j, 1] - (cosine * wind_e - sine * wind_n)
     speed2 = u * u + v * v
-    speed = math.sqrt(speed2)
-    angle = atan2(v, u)
-    q.wind_relative[p, 0] = speed
-    q.wind_relative[p, 1] = angle
-    if q.area_side[p] <= 0.0 or speed == 0.0:
+    if q.area_side[p] <= 0.0 or speed2 == 0.0:
+        q.tau_wind[p, 0] = q.tau_wind[p, 1] = q.tau_wind[p, 2] = 0.0
         return
-    along = u / speed
-    across = v / speed
+    per_speed = 1.0 / math.sqrt(speed2)
+    along = u * per_speed
+    across = v * per_speed
     cd_l = (q.cd_l_bow[p] if u >= 0.0 else q.cd_l_stern[p]) * q.wind_surge_factor[p]
     # delta / 2 sin^2(2 angle) = 2 delta (along across)^2
     squeeze = 1.0 - 2.0 * q.wind_delta[p] * (1.0 - cd_l / q.cd_t[p]) * (along * across) ** 2
@@ -138,7 +136,7 @@ def wind_load(w, j, p, sine, cosine):
     side = -load * q.cd_t[p] * across
     q.tau_wind[p, 0] = -load * cd_l * along
     q.tau_wind[p, 1] = side
-    q.tau_wind[p, 2] = side * (q.wind_arm[p] - 0.18 * (abs(angle) - 0.5 * math.pi) * q.length_pp[p])
+    q.tau_wind[p, 2] = side * (q.wind_arm[p] - 0.18 * (atan2(abs(v), u) - 0.5 * math.pi) * q.length_pp[p])
 
 
 @inner

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner
-from ..trig import sincos
+from ..jit import inner, scalar
+from ..trig import log, sincos
 from .actuators import thrust
 from .disturbance import wind_load
 
 WATER_DENSITY = 1025.0  #: [kg/m3]
 VISCOSITY = 1.0e-6  #: kinematic, of water [m2/s]
+_THIRD = 1.0 / 3.0
+_PER_DECADE = 1.0 / math.log(10.0)
 
 
 @inner
@@ -24,13 +26,15 @@ def plant_step(w, j, p, h):
     """Advance vessel slot j with plant p by h seconds, after ``actuate`` and ``wave_step``.
 
     Thrust, wind load, wave force and skin friction are evaluated once per tick; (eta, nu) advance by Heun's method.
-    Writes ``eta``, ``nu``, ``velocity`` of the slot and ``tau``, ``tau_wind``, ``wind_relative``, ``memory_x`` of the
-    plant.
+    Writes ``eta``, ``nu``, ``velocity`` of the slot and ``tau``, ``tau_wind``, ``memory_x``, ``turned`` of the plant.
     """
     vessels = w.vessels
     q = w.plants
     psi = vessels.eta[j, 2]
-    sine, cosine = sincos(psi)
+    if psi != q.turned[p, 0]:  # somebody has put it there
+        q.turned[p, 0] = psi
+        q.turned[p, 1], q.turned[p, 2] = sincos(psi)
+    sine, cosine = q.turned[p, 1], q.turned[p, 2]
     current_n = w.weather.current[0]
     current_e = w.weather.current[1]
     current_u = cosine * current_n + sine * current_e
@@ -70,6 +74,9 @@ def plant_step(w, j, p, h):
     r += half * (dr + dr1)
 
     sine, cosine = sincos(psi)
+    q.turned[p, 0] = psi
+    q.turned[p, 1] = sine
+    q.turned[p, 2] = cosine
     if q.current_turns[p] != 0:
         current_u = cosine * current_n + sine * current_e
         current_v = cosine * current_e - sine * current_n
@@ -85,18 +92,18 @@ def plant_step(w, j, p, h):
     vessels.velocity[j, 1] = sine * u + cosine * v
 
 
-@inner
+@scalar
 def _surge_friction(w, p, u):
     """Coefficient of |u| u: Xuu and, scaled, the ITTC-1957 line 0.075 / (log10 Re - 2)^2 plus a residual of 0.014."""
     q = w.plants
     if q.Xuu_ittc[p] == 0.0:
         return q.Xuu[p]
     reynolds = max(u, 0.2) * q.length_pp[p] / VISCOSITY
-    decades = math.log(reynolds) / math.log(10.0) - 2.0
+    decades = log(reynolds) * _PER_DECADE - 2.0
     return q.Xuu[p] + q.Xuu_ittc[p] * (0.075 / (decades * decades) + 0.014)
 
 
-@inner
+@scalar
 def _acceleration(w, p, u, v, r, friction, surge, sway, yaw):
     """(u', v', r') from velocities through the water and the external force: M^-1 (tau - C nu - d(nu))."""
     q = w.plants
@@ -111,11 +118,6 @@ def _acceleration(w, p, u, v, r, friction, surge, sway, yaw):
         (q.Nv[p] + q.Nvv[p] * av + q.Nrv[p] * ar) * v
         + (q.Nr[p] + q.Nvr[p] * av + q.Nrr[p] * ar + q.Nrrr[p] * r * r) * r
     )  # fmt: skip
-    m11 = q.m11[p]
-    m22 = q.m22[p]
-    m23 = q.m23[p]
-    m32 = q.m32[p]
-    m33 = q.m33[p]
     c11 = q.coriolis[p, 0]
     sway -= c11 * u * r
     if q.coriolis_linearised[p] == 0:  # does no work
@@ -127,11 +129,10 @@ def _acceleration(w, p, u, v, r, friction, surge, sway, yaw):
         force, moment = crossflow(v, r, q.strip_x0[p], q.strip_x1[p])
         sway -= q.crossflow_sway[p] * drag * force
         yaw -= q.crossflow_yaw[p] * drag * moment
-    scale = 1.0 / (m22 * m33 - m23 * m32)
-    return surge / m11, (m33 * sway - m23 * yaw) * scale, (m22 * yaw - m32 * sway) * scale
+    return q.i11[p] * surge, q.i22[p] * sway + q.i23[p] * yaw, q.i32[p] * sway + q.i33[p] * yaw
 
 
-@inner
+@scalar
 def crossflow(v, r, x0, x1):
     """Integrals over x0..x1 of |v + x r|(v + x r) dx and of the same times x, in closed form.
 
@@ -144,14 +145,15 @@ def crossflow(v, r, x0, x1):
     if y0 * y1 >= 0.0:
         m0 = x1 - x0
         m1 = 0.5 * (x1 * x1 - x0 * x0)
-        m2 = (x1 * x1 * x1 - x0 * x0 * x0) / 3.0
+        m2 = (x1 * x1 * x1 - x0 * x0 * x0) * _THIRD
         m3 = m1 * 0.5 * (x1 * x1 + x0 * x0)
         sign = 1.0 if y0 + y1 >= 0.0 else -1.0
         return sign * (v * v * m0 + r * (2.0 * v * m1 + r * m2)), sign * (v * v * m1 + r * (2.0 * v * m2 + r * m3))
-    c0 = abs(y0) ** 3
-    c1 = abs(y1) ** 3
-    third = (c1 - c0) / 3.0
-    return third / r, (0.25 * (y1 * c1 - y0 * c0) - v * third) / (r * r)
+    c0 = abs(y0 * y0 * y0)
+    c1 = abs(y1 * y1 * y1)
+    third = (c1 - c0) * _THIRD
+    g = 1.0 / r
+    return third * g, (0.25 * (y1 * c1 - y0 * c0) - v * third) * g * g
 
 
 @inner

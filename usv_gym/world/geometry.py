@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner
-from ..trig import sincos
+from ..jit import inner, scalar
+from ..trig import hypot, sincos
 
 BOW_TAPER = 0.25  #: share of the length over which the bow narrows to a point
 CLOSE = 30.0  #: [m] hulls nearer than this (plus their half lengths) are measured exactly
+PASSING = 60.0  #: [m] the closest point of approach of hulls nearer than this is found within the frame
+TINY = 1.0e-9  #: [m] instead of a distance of 0, to divide by
 CONTACT_STEP = 0.02  #: [m] resolution of the sweep: hulls may graze by less than this unnoticed
 
 
@@ -36,7 +38,7 @@ def point_segment(pn, pe, an, ae, bn, be):
     length2 = dn * dn + de * de
     t = ((pn - an) * dn + (pe - ae) * de) / length2 if length2 > 0.0 else 0.0
     t = min(max(t, 0.0), 1.0)
-    return math.hypot(pn - an - t * dn, pe - ae - t * de)
+    return hypot(pn - an - t * dn, pe - ae - t * de)
 
 
 @inner
@@ -99,14 +101,14 @@ def hull_hull(a, b):
     return best
 
 
-@inner
+@scalar
 def half_width(length, beam, aspect):
     """Half the width [m] a hull shows to a line of sight at the angle ``aspect`` [rad] from its centre line."""
     s, c = sincos(aspect)
     return 0.5 * (abs(length * s) + abs(beam * c))
 
 
-@inner
+@scalar
 def far_distance(dn, de, s1, c1, l1, b1, s2, c2, l2, b2):
     """Distance of two hulls that are far apart [m]: the other hull as a capsule, the own one by its extent towards it.
 
@@ -116,9 +118,9 @@ def far_distance(dn, de, s1, c1, l1, b1, s2, c2, l2, b2):
     axis = 0.5 * max(l2 - b2, 0.0)
     t = min(max(dn * c2 + de * s2, -axis), axis)
     rn, re = dn - t * c2, de - t * s2
-    r = math.sqrt(rn * rn + re * re)
+    r = hypot(rn, re)
     along = abs(rn * c1 + re * s1) * 0.5 * l1 + abs(re * c1 - rn * s1) * 0.5 * b1
-    return max(r - 0.5 * b2 - (along / r if r > 0.0 else 0.0), 0.0)
+    return max(r - 0.5 * b2 - along / max(r, TINY), 0.0)
 
 
 @inner

@@ -1,17 +1,20 @@
 """Truth about distances: the collision sweep between an observer's hull and everything else.
 
-Once per traffic frame every source is tested with a swept bounding circle.  Only the pairs that this leaves are followed
-through the frame by conservative advancement: with the hulls d apart and closing at most at v, nothing can touch for d / v
-seconds, so that is how far time may jump.  Nothing tunnels, and a pair far apart costs a few nanoseconds.
+Once per traffic frame every source is measured as if it were far away; those that may have been near are tested with a swept
+bounding circle.  Only the pairs that this leaves are followed through the frame by conservative advancement: with the hulls d
+apart and closing at most at v, nothing can touch for d / v seconds, so that is how far time may jump.  Nothing tunnels, and a
+pair far apart costs a few nanoseconds.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..jit import inner
-from ..trig import sincos
-from .geometry import CLOSE, CONTACT_STEP, far_distance, hull_hull, hull_vertices, point_hull
+from ..trig import clip, hypot, sincos, sincos_random
+from .geometry import CLOSE, CONTACT_STEP, PASSING, TINY, far_distance, hull_hull, hull_vertices, point_hull
 from .shore import coast, hull_land
 
 
@@ -40,7 +43,7 @@ def _follow(w, j, s, disc, l2, b2, n2, e2, p2, dn2, de2, dp2):
     dn1, de1, dp1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1, v.eta[j, 2] - p1
     l1, b1 = v.length[j], v.beam[j]
     # fastest that any two points of the hulls can close, per frame
-    closing = math.hypot(dn1 - dn2, de1 - de2) + abs(dp1) * 0.5 * math.hypot(l1, b1) + abs(dp2) * 0.5 * math.hypot(l2, b2)
+    closing = hypot(dn1 - dn2, de1 - de2) + abs(dp1) * 0.5 * hypot(l1, b1) + abs(dp2) * 0.5 * hypot(l2, b2)
     closing += 1.0e-9
     least = CONTACT_STEP / closing
     near = math.inf
@@ -60,43 +63,87 @@ def _follow(w, j, s, disc, l2, b2, n2, e2, p2, dn2, de2, dp2):
 
 
 @inner
-def _pass_discs(w, o, j):
-    """Distances of vessel j to all discs as if they were far, without a branch, so that the loop becomes vector code.
+def _pass_all(w, j):
+    """Distances of vessel j to all sources at the end of the frame as if they were far, without a branch: vector code.
 
-    Leaves the distance over the frame in ``w.ranges`` and at its end in ``safety.distance``, and 1 in ``w.hidden`` for the
-    discs that came close and have to be followed.
+    Leaves them in ``w.end`` and ``w.near`` (inf where there is nothing), and 1 in ``w.hidden`` for the sources that may
+    have come nearer than PASSING within the frame; returns how many those are.  What passes farther away than that comes
+    no nearer than at the ends of its frames by more than 0.2 m.
     """
     v, m = w.vessels, w.obstacles
     V = v.active.shape[0]
-    n1, e1 = v.frame_eta[j, 0], v.frame_eta[j, 1]
-    dn1, de1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1
-    half_l, half_b = 0.5 * v.length[j], 0.5 * v.beam[j]
-    limit = math.sqrt(half_l * half_l + half_b * half_b) + CLOSE
+    n1, e1 = v.eta[j, 0], v.eta[j, 1]
+    l1, b1 = v.length[j], v.beam[j]
     s1, c1 = sincos(v.eta[j, 2])
+    limit = 0.5 * (l1 + b1) + PASSING + hypot(n1 - v.frame_eta[j, 0], e1 - v.frame_eta[j, 1])
+    close = 0
+    for s in range(V):
+        dn, de = n1 - v.eta[s, 0], e1 - v.eta[s, 1]
+        l2, b2 = v.length[s], v.beam[s]
+        # the heading in the middle of the frame: a frame is short, and reading all of a row spares the loop a remainder
+        s2, c2 = sincos_random(0.5 * (v.frame_eta[s, 2] + v.eta[s, 2]))
+        end = far_distance(dn, de, s1, c1, l1, b1, s2, c2, l2, b2)
+        reach = limit + 0.5 * (l2 + b2) + abs(v.eta[s, 0] - v.frame_eta[s, 0]) + abs(v.eta[s, 1] - v.frame_eta[s, 1])
+        there = (v.active[s] != 0) & (s != j)
+        follow = there & (dn * dn + de * de <= reach * reach)
+        w.near[s] = end if there else math.inf
+        w.end[s] = end
+        w.hidden[s] = follow
+        close += follow
+    half_l, half_b = 0.5 * l1, 0.5 * b1
     for i in range(m.active.shape[0]):
-        rn, re = n1 - m.frame_position[i, 0], e1 - m.frame_position[i, 1]
-        vn = dn1 - (m.position[i, 0] - m.frame_position[i, 0])
-        ve = de1 - (m.position[i, 1] - m.frame_position[i, 1])
-        t = min(max(-(rn * vn + re * ve) / max(vn * vn + ve * ve, 1.0e-12), 0.0), 1.0)
-        an, ae = rn + t * vn, re + t * ve
-        bn, be = rn + vn, re + ve
-        a = math.sqrt(an * an + ae * ae) + 1.0e-9
-        b = math.sqrt(bn * bn + be * be) + 1.0e-9
-        a_near = a - m.radius[i] - (abs(an * c1 + ae * s1) * half_l + abs(ae * c1 - an * s1) * half_b) / a
-        b_near = b - m.radius[i] - (abs(bn * c1 + be * s1) * half_l + abs(be * c1 - bn * s1) * half_b) / b
-        end = max(b_near, 0.0)
-        w.ranges[V + i] = min(max(a_near, 0.0), end)
-        w.half_angles[V + i] = end
-        w.hidden[V + i] = 1 if a < limit + m.radius[i] else 0
+        dn, de = n1 - m.position[i, 0], e1 - m.position[i, 1]
+        r2 = dn * dn + de * de
+        r = math.sqrt(r2)
+        along = abs(dn * c1 + de * s1) * half_l + abs(de * c1 - dn * s1) * half_b
+        end = max(r - m.radius[i] - along / max(r, TINY), 0.0)
+        reach = limit + m.radius[i]
+        reach += abs(m.position[i, 0] - m.frame_position[i, 0]) + abs(m.position[i, 1] - m.frame_position[i, 1])
+        there = m.active[i] != 0
+        follow = there & (r2 <= reach * reach)
+        w.near[V + i] = end if there else math.inf
+        w.end[V + i] = end
+        w.hidden[V + i] = follow
+        close += follow
+    return close
 
 
 @inner
-def _note(safety, o, s, near, end):
-    safety.distance[o, s] = end
-    safety.closest[o, s] = min(safety.closest[o, s], near)
-    safety.step_closest[o] = min(safety.step_closest[o], near)
-    if near <= 0.0 and safety.collided_with[o] < 0:
-        safety.collided_with[o] = s
+def _pass_near(w, o, j):
+    """Look closer at what _pass_all() has found near vessel j of observer o: the closest point of approach within the frame.
+
+    Hulls that come nearer than CLOSE are followed.
+    """
+    v, m, safety = w.vessels, w.obstacles, w.safety
+    V = v.active.shape[0]
+    n1, e1 = v.frame_eta[j, 0], v.frame_eta[j, 1]
+    dn1, de1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1
+    l1, b1 = v.length[j], v.beam[j]
+    s1, c1 = sincos(v.eta[j, 2])
+    for s in range(w.hidden.shape[0]):
+        if w.hidden[s] == 0:
+            continue
+        if s < V:
+            n2, e2, p2 = v.frame_eta[s, 0], v.frame_eta[s, 1], v.frame_eta[s, 2]
+            dn2, de2, dp2 = v.eta[s, 0] - n2, v.eta[s, 1] - e2, v.eta[s, 2] - p2
+            l2, b2 = v.length[s], v.beam[s]
+            reach = 0.5 * (hypot(l1, b1) + hypot(l2, b2)) + CLOSE
+        else:
+            n2, e2, p2 = m.frame_position[s - V, 0], m.frame_position[s - V, 1], 0.0
+            dn2, de2, dp2 = m.position[s - V, 0] - n2, m.position[s - V, 1] - e2, 0.0
+            l2 = b2 = 2.0 * m.radius[s - V]
+            reach = 0.5 * (hypot(l1, b1) + l2) + CLOSE
+        rn, re = n1 - n2, e1 - e2
+        vn, ve = dn1 - dn2, de1 - de2
+        t = clip(-(rn * vn + re * ve) / max(vn * vn + ve * ve, 1.0e-12), 0.0, 1.0)
+        rn, re = rn + t * vn, re + t * ve
+        if rn * rn + re * re > reach * reach:
+            s2, c2 = sincos(p2 + t * dp2)
+            w.near[s] = min(w.near[s], far_distance(rn, re, s1, c1, l1, b1, s2, c2, l2, b2))
+            continue
+        w.near[s], w.end[s] = _follow(w, j, s, s >= V, l2, b2, n2, e2, p2, dn2, de2, dp2)
+        if w.near[s] <= 0.0 and safety.collided_with[o] < 0:
+            safety.collided_with[o] = s
 
 
 @inner
@@ -106,8 +153,8 @@ def _pass_land(w, h, land, o, j):
     n, e, p = v.frame_eta[j, 0], v.frame_eta[j, 1], v.frame_eta[j, 2]
     dn, de, dp = v.eta[j, 0] - n, v.eta[j, 1] - e, v.eta[j, 2] - p
     length, beam = v.length[j], v.beam[j]
-    reach = 0.5 * math.hypot(length, beam)
-    closing = math.hypot(dn, de) + abs(dp) * reach + 1.0e-9
+    reach = 0.5 * hypot(length, beam)
+    closing = hypot(dn, de) + abs(dp) * reach + 1.0e-9
     exact = CLOSE + closing
     hull_vertices(w.hull[0], n + dn, e + de, p + dp, length, beam)
     end = near = hull_land(land, h, w.hull[0], n + dn, e + de, reach, exact)
@@ -127,50 +174,21 @@ def _pass_land(w, h, land, o, j):
 @inner
 def sweep(w, land):
     """Distances of every observer's hull to every source, and to land, over the frame that ends now."""
-    v, m, safety = w.vessels, w.obstacles, w.safety
-    V = v.active.shape[0]
+    safety = w.safety
+    S = w.near.shape[0]
     h = coast(land, w.land_id)
     for o in range(w.observer.shape[0]):
         j = w.observer[o]
-        if v.active[j] == 0:
+        if w.vessels.active[j] == 0:
             continue
         if h != 0:
             _pass_land(w, h, land, o, j)
-        n1, e1 = v.frame_eta[j, 0], v.frame_eta[j, 1]
-        dn1, de1 = v.eta[j, 0] - n1, v.eta[j, 1] - e1
-        l1, b1 = v.length[j], v.beam[j]
-        s1, c1 = sincos(v.eta[j, 2])
-        reach1 = 0.5 * math.sqrt(l1 * l1 + b1 * b1)
-        for s in range(V):
-            if v.active[s] == 0 or s == j:
-                continue
-            n2, e2, p2 = v.frame_eta[s, 0], v.frame_eta[s, 1], v.frame_eta[s, 2]
-            dn2, de2, dp2 = v.eta[s, 0] - n2, v.eta[s, 1] - e2, v.eta[s, 2] - p2
-            l2, b2 = v.length[s], v.beam[s]
-            rn, re = n1 - n2, e1 - e2
-            vn, ve = dn1 - dn2, de1 - de2
-            travelled2 = vn * vn + ve * ve
-            t = min(max(-(rn * vn + re * ve) / travelled2, 0.0), 1.0) if travelled2 > 0.0 else 1.0
-            limit = reach1 + 0.5 * math.sqrt(l2 * l2 + b2 * b2) + CLOSE
-            if (rn + t * vn) ** 2 + (re + t * ve) ** 2 > limit * limit:
-                s2, c2 = sincos(p2 + dp2)
-                end = far_distance(rn + vn, re + ve, s1, c1, l1, b1, s2, c2, l2, b2)
-                near = end
-                if 0.0 < t < 1.0:  # passing: the nearest point lies within the frame
-                    near = min(near, far_distance(rn + t * vn, re + t * ve, s1, c1, l1, b1, s2, c2, l2, b2))
-            else:
-                near, end = _follow(w, j, s, False, l2, b2, n2, e2, p2, dn2, de2, dp2)
-            _note(safety, o, s, near, end)
-        _pass_discs(w, o, j)
-        for i in range(m.active.shape[0]):
-            if m.active[i] == 0:
-                continue
-            s = V + i
-            near, end = w.ranges[s], w.half_angles[s]
-            if w.hidden[s]:
-                d2 = 2.0 * m.radius[i]
-                n2, e2 = m.frame_position[i, 0], m.frame_position[i, 1]
-                near, end = _follow(
-                    w, j, s, True, d2, d2, n2, e2, 0.0, m.position[i, 0] - n2, m.position[i, 1] - e2, 0.0
-                )
-            _note(safety, o, s, near, end)
+        if _pass_all(w, j) > 0:
+            _pass_near(w, o, j)
+        # distances are not negative, and such numbers have the order of their bits: whole numbers are compared in parallel
+        nearest = np.float64(math.inf).view(np.int64)
+        for s in range(S):
+            nearest = min(nearest, np.float64(w.near[s]).view(np.int64))
+            safety.closest[o, s] = min(safety.closest[o, s], w.near[s])
+            safety.distance[o, s] = w.end[s] if w.near[s] < math.inf else safety.distance[o, s]
+        safety.step_closest[o] = min(safety.step_closest[o], np.int64(nearest).view(np.float64))

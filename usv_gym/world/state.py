@@ -9,6 +9,9 @@ anything a sensor can see: vessel j is source j, obstacle m is source V + m), O 
 A thrusters per plant, W waypoints per route, L bearing sectors of land, T stretches of coast, E events,
 R encounters that a ship keeps in mind.
 
+Loops over slots become vector code only where LLVM can prove in one comparison that nothing they write is read: what a loop
+writes stands before or behind all that it reads (``eta`` first in its group, work space last), never in between.
+
 Units and frames: SI and radians; {n} is the local tangent plane (north, east) at ``origin``; {b} is the body frame
 (forward, starboard).  Times are integers: ticks of ``dt_us``, or microseconds where the name ends in ``_us``.
 """
@@ -94,6 +97,7 @@ def _plants(P: int) -> Dtype:
     return np.dtype([
         # rigid body and added mass, M = [[m11, 0, 0], [0, m22, m23], [0, m32, m33]]
         ("m11", f8, (P,)), ("m22", f8, (P,)), ("m23", f8, (P,)), ("m32", f8, (P,)), ("m33", f8, (P,)),
+        ("i11", f8, (P,)), ("i22", f8, (P,)), ("i23", f8, (P,)), ("i32", f8, (P,)), ("i33", f8, (P,)),  # M^-1
         # C(nu) nu = [-(c22 v + c23 r) r, c11 u r, (c22 v + c23 r) u - c11 u v]; linearised: only c11 u r in sway
         ("coriolis", f8, (P, 3)), ("coriolis_linearised", i1, (P,)),  # c11, c22 [kg], c23 [kg m]
         # damping derivatives as in the literature: force = derivative * motion, hence negative numbers for drag
@@ -144,15 +148,15 @@ def _plants(P: int) -> Dtype:
         ("tau", f8, (P, 3)), ("tau_wind", f8, (P, 3)), ("tau_wave", f8, (P, 3)),  # [N, N, N m] {b}
         ("memory_x", f8, (P, 4, 4)),  # fluid-memory states: sway-sway, yaw-yaw, yaw to sway, sway to yaw
         ("wave_x", f8, (P, 3, 2)),  # wave-force states per degree of freedom, unit variance
-        ("wind_relative", f8, (P, 2)),  # at sensor height: speed [m/s]; angle off the bow it comes from [rad]
+        ("turned", f8, (P, 3)),  # heading after the last tick [rad], its sine and cosine
     ], align=True)  # fmt: skip
 
 
 def _vessels(V: int) -> Dtype:
     return np.dtype([
+        ("eta", f8, (V, 3)),  # N, E [m], psi [rad] {n}; psi is not wrapped
         ("active", i1, (V,)), ("controlled", i1, (V,)), ("kind", i1, (V,)), ("model", i1, (V,)), ("behaviour", i1, (V,)),
         ("plant", i2, (V,)),  # index into plants, -1 for kinematic ships
-        ("eta", f8, (V, 3)),  # N, E [m], psi [rad] {n}; psi is not wrapped
         ("nu", f8, (V, 3)),  # u, v [m/s], r [rad/s] {b}, over ground
         ("velocity", f8, (V, 2)),  # N, E {n} [m/s], over ground
         ("frame_eta", f8, (V, 3)),  # eta at the start of the traffic frame
@@ -224,8 +228,8 @@ def _replays(V: int) -> Dtype:
 
 def _obstacles(M: int) -> Dtype:
     return np.dtype([
-        ("active", i1, (M,)), ("kind", i1, (M,)),
         ("position", f8, (M, 2)),  # N, E [m] {n}
+        ("active", i1, (M,)), ("kind", i1, (M,)),
         ("frame_position", f8, (M, 2)),  # at the start of the traffic frame
         ("velocity", f8, (M, 2)),  # own drift [m/s] {n}
         ("drifts", i1, (M,)),  # 1: also carried by the current
@@ -287,6 +291,7 @@ def _sensors() -> Dtype:
         # TDM
         ("tdm_period_us", i8),
         ("process_u", f8), ("process_r", f8), ("process_time", f8),  # PSD [(m/s2)^2/s], [(rad/s2)^2/s]; T [s] of b1, b2
+        ("light", i1), ("light_q", f8),  # 1: the filters of sensors/light.py; PSD of their acceleration [(m/s2)^2/s]
         ("inflation", f8),  # Carlson's federated inflation of Q and P0; 1 in the thesis
         # own navigation: period [us], white noise per field
         ("gnss_period_us", i8), ("gnss_noise", f8, (4,)),  # position [m], heading [rad], course [rad], speed [m/s]
@@ -407,9 +412,15 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("safety", _safety(O, S)), ("pairs", pair_dtype(), (O, V)),  # kept while a reward term asks for it
         ("sensors", _sensors()), ("observer", i2, (O,)),  # vessel slot of each observer
         ("ais", _ais(O, S)), ("nav", _nav(O)), ("tracks", _tracks(O, S)), ("picture", _picture(O, S)),
-        # work space of the shadow test (sensors/shadow.py) and of the hull distance (world/geometry.py)
+        # work space of the collision sweep (world/safety.py): smallest distance within the frame, distance at its end [m]
+        ("near", f8, (S,)), ("end", f8, (S,)), ("hull", f8, (2, 5, 2)),
+        # work space of the steering of ships (traffic/ships.py): how, where to [m] {n} or [rad], speed [m/s];
+        # what comes of it: yaw rate [rad/s], velocity N, E [m/s]
+        ("steer_how", i1, (V,)), ("steer_north", f8, (V,)), ("steer_east", f8, (V,)), ("steer_heading", f8, (V,)),
+        ("steer_speed", f8, (V,)), ("steered_rate", f8, (V,)), ("steered_velocity", f8, (2, V)),
+        # work space of the shadow test (sensors/shadow.py)
         ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("order", i4, (S,)), ("hidden", i1, (S,)),
-        ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)), ("hull", f8, (2, 5, 2)),
+        ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)),
         ("estimate_x", f8, (2, 7)), ("estimate_p", f8, (2, 28)),  # of the fusion (sensors/tdm.py)
     ], align=True)  # fmt: skip
 

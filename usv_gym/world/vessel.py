@@ -291,6 +291,9 @@ def write_plant(
     values: dict[str, Any] = model.damping.model_dump()
     m = model.mass.matrix()
     values |= {"m11": m[0, 0], "m22": m[1, 1], "m23": m[1, 2], "m32": m[2, 1], "m33": m[2, 2]}
+    m = np.linalg.inv(m)
+    values |= {"i11": m[0, 0], "i22": m[1, 1], "i23": m[1, 2], "i32": m[2, 1], "i33": m[2, 2]}
+    values["turned"] = 0.0, 0.0, 1.0
     values |= {"coriolis": model.coriolis_masses(), "coriolis_linearised": model.coriolis.form == "linearised"}
     areas = model.wind.frontal_area_m2, model.wind.lateral_area_m2
     flow, wind, waves, pilot = model.crossflow, model.wind, model.waves, model.autopilot
