@@ -85,7 +85,7 @@ def scaling(seconds: float, quick: bool) -> dict[str, Any]:
     for key in ("truth_us", "tracks_us"):
         x, y = np.log([row["n"] for row in many]), np.log([row[key] for row in many])
         result[f"slope_{key[:-3]}"] = float(np.polyfit(x, y, 1)[0])
-    print(f"  log-log slope from 8 ships on: truth {result['slope_truth']:.2f}, tracks {result['slope_tracks']:.2f}", flush=True)
+    print(f"  log-log slope from 8 ships on: truth {result['slope_truth']:.2f}, tracks {result['slope_tracks']:.2f}")
     for n in (0, 32) if quick else OBSTACLES:
         row = {"n": n, "tracks_us": cost("tracks", icebergs=n), "truth_us": cost("truth", icebergs=n)}
         result["obstacles"].append(row)
@@ -205,8 +205,7 @@ def _sb3(seconds: float) -> dict[str, Any] | None:
             print("  skipped: stable-baselines3 is not installed")
             return None
         result[name] = rates
-        print(f"  {name:14} vector {rates['vector']:>9,.0f}, adapter {rates['adapter']:>9,.0f}, "
-              f"DummyVecEnv {rates['dummy']:>9,.0f}, SubprocVecEnv {rates['subproc']:>7,.0f}, PPO's rollouts {rates['ppo_rollouts']:>8,.0f} steps/s", flush=True)
+        print(f"  {name:14} " + ", ".join(f"{key} {value:,.0f}" for key, value in rates.items()) + " steps/s", flush=True)
     return result
 
 
