@@ -146,7 +146,8 @@ def peers(seconds: float) -> dict[str, dict[str, float] | None]:
         except (ImportError, gym.error.Error):
             result[name] = None
             continue
-        result[name] = rounds(lambda env=env: _play(env, 2000 if module is None else 40), seconds)  # type: ignore[misc]
+        steps = 40 if module else 2000
+        result[name] = rounds(lambda env=env, steps=steps: _play(env, steps), seconds)  # type: ignore[misc]
         env.close()
     return result
 
