@@ -10,7 +10,7 @@ import warnings
 
 import typer
 
-from . import campaign, check, files, hil, run, scenarios, traffic, train, views  # noqa: F401  in the order of `usv-gym --help`
+from . import campaign, check, files, hil, judge, run, scenarios, traffic, train, views  # noqa: F401  in the order of `usv-gym --help`
 from .app import app, complain
 
 

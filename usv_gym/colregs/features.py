@@ -221,7 +221,7 @@ def find_encounters(params, t, eta, velocity, active, steps, ready, own, length,
         slow = 0.25 * p.moving
         courses(velocity[b, :, i], eta[b, :, i], n, slow, course1, speed1)
         for j in range(eta.shape[2]):
-            if j == i:
+            if j == i or not active[b, :n, j].any():
                 continue
             courses(velocity[b, :, j], eta[b, :, j], n, slow, course2, speed2)
             l1, b1, l2, b2 = length[b, i], beam[b, i], length[b, j], beam[b, j]

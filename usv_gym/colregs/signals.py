@@ -176,12 +176,7 @@ def margins(params, d, x, steps, ready, own, work, hulls, pairs, signals, of_pai
         for j in range(out.shape[2]):
             if only >= 0 and j != only:
                 continue
-            seen = j == i
-            for k in range(n):
-                if seen:
-                    break
-                seen = x[3][b, k, j]
-            if n == 0 or not seen:
+            if n == 0 or not (j == i or x[3][b, :n, j].any()):
                 continue
             if j != i:
                 courses(x[2][b, :, j], x[1][b, :, j], n, slow, work[2], work[3])
