@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 #: fastest that a ship may be between two fixes [m/s], and the slack of position and clock [m], [s]
 FASTEST, SLACK, SLACK_TIME = 60.0 * KNOT, 50.0, 3.0
 #: [m] and [s] standard deviations of a reported position and of its time; of SOG [m/s] and COG [rad]
-POSITION_STD, TIME_STD, SPEED_STD, COURSE_STD = 5.0, 1.0, 0.15, 2.0 * DEG
+POSITION_STD, TIME_STD, SPEED_STD, COURSE_STD = 5.0, 1.0, 0.3, 2.0 * DEG
 ACCELERATION = 0.05  #: spectral density of a ship's acceleration [m^2/s^3]
 HULLS = 8  #: that may share an MMSI at a time; with more, the one that was silent longest is over
 STILL = 0.5 * KNOT  #: [m/s] below which course over ground says nothing about heading
