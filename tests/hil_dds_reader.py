@@ -75,7 +75,8 @@ TOPICS = {
     "heading_speed": ("rt/cmd/heading_speed", HeadingSpeed),
 }
 readers = {
-    name: DataReader(participant, Topic(participant, topic, cls, qos=qos), qos=qos) for name, (topic, cls) in TOPICS.items()
+    name: DataReader(participant, Topic(participant, topic, cls, qos=qos), qos=qos)
+    for name, (topic, cls) in TOPICS.items()
 }
 seen = {name: [] for name in readers}
 until = time.monotonic() + float(sys.argv[2])

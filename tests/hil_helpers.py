@@ -44,12 +44,12 @@ def actuators(step, stamp):
 
 
 def memory_bridge(
-    *, profile="standard", scenario="calm_crossing", duration=5.0, answer=True, overrides=(), bridge=None, **control
+    *, profile="standard", scenario="calm_crossing", duration=5.0, answer=True, overrides=(), bridge=None, more=(), **control
 ):
     """A bridge over memory, in lock-step unless told otherwise, with a controller that answers every step."""
     wire = make_backend("memory")
     options = {key: control.pop(key) for key in ("trouble", "external", "seed", "factor", "control") if key in control}
-    link = Link(load_profile(profile), [wire], **options)
+    link = Link(load_profile(profile), [wire, *more], **options)
     made = Bridge(plan_hil(scenario, duration=duration, overrides=overrides), link, ExternalController(link, **control),
                   record=True, **(bridge or {}))  # fmt: skip
     seen = {}

@@ -18,13 +18,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hil_helpers import EXAMPLES, ROOT, ROUTE, end, expected, free_port, spawn
+from hil_helpers import EXAMPLES, ROOT, ROUTE, end, expected, free_port, memory_bridge, spawn
 
 from usv_gym.replay.archive import load
 from usv_gym.run import resimulate
 
 TESTS = Path(__file__).parent
 STEPS = 200
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """Kernels are on the disk before a process needs them within seconds."""
+    bridge, _, _ = memory_bridge()
+    bridge.step()
 
 
 # --- what is here ----------------------------------------------------------------------------------------------------

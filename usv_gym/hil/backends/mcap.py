@@ -6,6 +6,7 @@ Written by rosbags, so that no ROS is needed.  The file appears when it is close
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -61,13 +62,13 @@ class Mcap:
         connections: dict[tuple[str, str], Any] = {}
         for row in (*out, *incoming):
             text = isinstance(row.fields, list | tuple)
-            kind = "std_msgs/msg/String" if text else "/msg/".join(row.type.split("/", 1))
+            kind = "std_msgs/msg/String" if text else _kind(row.type)
             topic = f"/nmea/{row.topic}" if text else f"/{row.topic.lstrip('/')}"
             if kind not in store.fielddefs:
                 raise ConfigError(f"{row.topic}: message type {row.type!r} is not known")
             if (topic, kind) not in connections:
                 connections[topic, kind] = self._writer.add_connection(topic, kind, typestore=store)
-            build = _sentences(row, row in out, store) if text else builder(store, kind)
+            build = _sentences(row, row in out, store) if text else _renamed(row.type, builder(store, kind))
             self._rows[row] = connections[topic, kind], kind, build
 
     def publish(self, row: Row, message: Any) -> None:
@@ -103,6 +104,24 @@ class Mcap:
             shutil.rmtree(self._temporary, ignore_errors=True)
 
 
+ORIGINAL = "simulator_messages"  #: ROS 2 does not allow its names: MMSI and headingRate become mmsi and heading_rate
+
+
+def _snake(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
+def _kind(kind: str) -> str:
+    package, _, name = kind.partition("/")
+    return f"{package}/msg/{name[:1].upper() + name[1:] if package == ORIGINAL else name}"
+
+
+def _renamed(kind: str, build: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    if not kind.startswith(f"{ORIGINAL}/"):
+        return build
+    return lambda message: build({_snake(name): value for name, value in message.items()})
+
+
 def _register(store: Any) -> None:
     """Add the project's own message types."""
     from rosbags.typesys import get_types_from_msg
@@ -111,7 +130,10 @@ def _register(store: Any) -> None:
     for path in sorted(ros().glob("*/msg/*.msg")):
         text = path.read_text().replace("\nHeader ", "\nstd_msgs/Header ")
         text = f"std_msgs/{text}" if text.startswith("Header ") else text
-        types.update(get_types_from_msg(text, f"{path.parts[-3]}/msg/{path.stem}"))
+        if path.parts[-3] == ORIGINAL:
+            lines = (line.partition(" ") for line in text.splitlines())
+            text = "\n".join(f"{kind} {_snake(name)}" for kind, _, name in lines)
+        types.update(get_types_from_msg(text, _kind(f"{path.parts[-3]}/{path.stem}")))
     store.register(types)
 
 
