@@ -1,15 +1,15 @@
 """A control process in ROS 2 for the tests: answers every step with commands that follow from its number."""
 
-import sys
+import contextlib
 
 import rclpy
 from hil_demand import demand
+from rclpy.executors import ExternalShutdownException
 from usv_gym_msgs.msg import Actuators, Status
 
 rclpy.init()
 node = rclpy.create_node("peer")
 publisher = node.create_publisher(Actuators, "cmd/actuators", 100)
-last = int(sys.argv[1])
 
 
 def step(message):
@@ -22,4 +22,5 @@ def step(message):
 
 
 node.create_subscription(Status, "hil/status", step, 100)
-rclpy.spin(node)
+with contextlib.suppress(ExternalShutdownException, KeyboardInterrupt):
+    rclpy.spin(node)

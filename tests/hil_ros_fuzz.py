@@ -76,4 +76,6 @@ for k in range(count):
     publisher.publish(fill(cls()))
     if k % 20 == 0:
         time.sleep(0.004)  # a few thousand a second, which the transport can hold
+if which == "ros2":
+    topics[1][1].publish(Command(command="resume"))
 time.sleep(2.0)

@@ -221,7 +221,7 @@ def test_ros1_survives_its_controller_and_its_master(ros1, tmp_path):
 # --- ROS 2 -----------------------------------------------------------------------------------------------------------
 def test_ros2_lock_step_is_the_plain_environment_bit_for_bit(ros2, tmp_path):
     python, environment = ros2
-    peer = spawn(python, TESTS / "hil_ros2_peer.py", str(STEPS), env=environment)
+    peer = spawn(python, TESTS / "hil_ros2_peer.py", env=environment)
     try:
         text = finish(bridge(python, environment, tmp_path, "--backend", "ros2", "--lock-step", "--interval", "0.05",
                              "--duration", "10"))  # fmt: skip
@@ -233,15 +233,15 @@ def test_ros2_lock_step_is_the_plain_environment_bit_for_bit(ros2, tmp_path):
 
 
 def test_ros2_example_avoids_the_crossing_ship_and_a_bare_dds_peer_reads_along(ros2, tmp_path):
-    """Real time, six times as fast; CycloneDDS, another implementation of the protocol, reads what we publish."""
+    """Real time, ten times as fast; CycloneDDS, another implementation of the protocol, reads what we publish."""
     python, environment = ros2
-    running = bridge(python, environment, tmp_path, "--backend", "ros2", "--control", "heading_speed", "--realtime", "6",
+    running = bridge(python, environment, tmp_path, "--backend", "ros2", "--control", "heading_speed", "--realtime", "10",
                      "--duration", "110", "--start",
                      f"{python} {EXAMPLES / 'ros2_controller.py'} --route {' '.join(ROUTE)}")  # fmt: skip
     try:
         pytest.importorskip("cyclonedds")
         seen = json.loads(subprocess.run(
-            [sys.executable, TESTS / "hil_dds_reader.py", environment["ROS_DOMAIN_ID"], "6"],
+            [sys.executable, TESTS / "hil_dds_reader.py", environment["ROS_DOMAIN_ID"], "4"],
             capture_output=True, text=True, check=True, timeout=60).stdout)  # fmt: skip
         text = finish(running)
     finally:

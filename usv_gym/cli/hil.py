@@ -29,7 +29,7 @@ def hil(
     lock_step: Annotated[
         bool, typer.Option("--lock-step", help="wait for each command instead; as fast as that goes")
     ] = False,
-    interval: Annotated[float, typer.Option(help="seconds between the commands that a lock-step waits for")] = 0.1,
+    interval: Annotated[float, typer.Option(help="seconds between two steps that ask for a command")] = 0.1,
     timeout: Annotated[float, typer.Option(help="seconds without a command until the fail-safe acts")] = 1.0,
     fail_safe: Annotated[str, typer.Option(help="zero: thrust to zero; hold: the last command")] = "zero",
     patience: Annotated[float, typer.Option(help="seconds that a lock-step waits for the first command")] = 30.0,

@@ -32,7 +32,7 @@ from .signals import Values
 
 OwnShip = Literal["simulated", "external", "only"]
 FOREVER = 1e8  #: [s]
-SLIP = 1.0  #: [s] behind schedule after which the schedule starts anew
+SLIP = 5.0  #: [s] behind schedule after which the schedule starts anew
 SPAWN_RADIUS = 20.0  #: [m] of an obstacle that is spawned without one, as in the original
 _LIMITS = {"north": 1e7, "east": 1e7, "sog": 100.0, "yaw_rate": 10.0, "heading": 1e3, "course": 1e3}  # of a pose
 _KEPT = 1 << 17  #: latenesses that are kept

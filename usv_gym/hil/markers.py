@@ -16,7 +16,7 @@ _COLOURS = {
     "text": (1.0, 1.0, 1.0, 1.0),
 }  # fmt: skip
 LIFETIME_NS = 2_000_000_000  #: a marker that is not repeated vanishes
-METRES_PER_KN = 2.0  #: length of a thrust arrow per kN
+METRES_PER_KN = 12.0  #: length of a thrust arrow per kN
 
 
 def markers(signals: Any) -> list[dict[str, Any]]:
@@ -25,11 +25,11 @@ def markers(signals: Any) -> list[dict[str, Any]]:
     made: list[dict[str, Any]] = []
 
     def add(ns: str, kind: int, colour: str, scale: tuple[float, float, float], x: float = 0.0, y: float = 0.0,
-            yaw: float = 0.0, **more: Any) -> None:  # fmt: skip
+            yaw: float = 0.0, z: float = 0.0, **more: Any) -> None:  # fmt: skip
         r, g, b, a = _COLOURS[colour]
         made.append({
             "header": {"stamp": stamp, "frame_id": "map"}, "ns": ns, "id": len(made), "type": kind, "action": 0,
-            "pose": {"position": {"x": x, "y": y, "z": 0.0},
+            "pose": {"position": {"x": x, "y": y, "z": z},
                      "orientation": {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)}},
             "scale": dict(zip("xyz", scale, strict=True)), "color": {"r": r, "g": g, "b": b, "a": a},
             "lifetime": Stamp(LIFETIME_NS), **more,
@@ -46,7 +46,7 @@ def markers(signals: Any) -> list[dict[str, Any]]:
                 _thrust(signals, thing, add)
         else:
             add("obstacles", CYLINDER, "obstacle", (2 * size, 2 * size, 2.0), x, y)
-        add("names", TEXT, "text", (1.0, 1.0, 12.0), x + size, y + size, text=thing["id"])
+        add("names", TEXT, "text", (1.0, 1.0, 12.0), x, y + size + 8.0, z=20.0, text=thing["id"])
     picture = signals.w["picture"]
     for s in np.flatnonzero(picture["id"][0]).tolist():
         north, east = map(float, picture["position"][0, s])
@@ -81,6 +81,5 @@ def _thrust(signals: Any, own: dict[str, Any], add: Any) -> None:
         along = psi + float(q["direction"][p, a]) + float(q["alpha"][p, a]) + (math.pi if force < 0 else 0.0)
         north = own["north"] + x * math.cos(psi) - y * math.sin(psi)
         east = own["east"] + x * math.sin(psi) + y * math.cos(psi)
-        add(
-            "thrust", ARROW, "thrust", (METRES_PER_KN * abs(force) / 1000.0, 1.0, 1.0), east, north, math.pi / 2 - along
-        )
+        length = METRES_PER_KN * abs(force) / 1000.0
+        add("thrust", ARROW, "thrust", (length, 2.5, 1.0), east, north, math.pi / 2 - along, z=5.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,14 +47,12 @@ def serve(
     link = make_link(
         rig, profile, more=recorders, seed=mission.seed, factor=realtime or 0.0, external=own_ship == "external"
     )
-    controller = make_controller(
-        rig, link, lock_step=lock_step, interval=steps if lock_step else max(round(0.1 / dt), 1)
-    )
+    controller = make_controller(rig, link, lock_step=lock_step, interval=steps)
     if view == "map" and threading.current_thread() is not threading.main_thread():
         raise ConfigError("--view map: needs the main thread")
     keep = out is not None or view == "browser"
     bridge = Bridge(mission, link, controller, realtime=realtime, own_ship=own_ship, record=keep, endless=endless)
-    controller.told = lambda event, t: say(f"t={t:.2f} s: " + " ".join(filter(None, event.values())))
+    controller.told = _Told(say)
     process = None
     try:
         link.open()
@@ -80,6 +79,25 @@ def serve(
         write_outputs(bridge.voyage.finish(), out)
         say(f"{out}: episode.usv  ais.nmea  detections.csv  map.png  summary.json")
     return report
+
+
+class _Told:
+    """Events on the terminal, at most ``MOST`` in a second."""
+
+    MOST = 10
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._began, self._count = say, 0.0, 0
+
+    def __call__(self, event: Mapping[str, str], t: float) -> None:
+        now = time.monotonic()
+        if now - self._began > 1.0:
+            if self._count > self.MOST:
+                self._say(f"and {self._count - self.MOST} more")
+            self._began, self._count = now, 0
+        self._count += 1
+        if self._count <= self.MOST:
+            self._say(f"t={t:.2f} s: " + " ".join(part for part in event.values() if part)[:200])
 
 
 def _run(bridge: Bridge, view: str | None, port: int, say: Callable[[str], None]) -> None:

@@ -243,7 +243,7 @@ class Commands:
         self.log.append((int(self._w["tick"]), command, arguments))
 
     def _find(self, id: str, command: str, own: bool = False) -> int:
-        if id in self.names and (own or id != OWN_SHIP):
+        if id and id in self.names and (own or id != OWN_SHIP):
             return self.names.index(id)
         if id == OWN_SHIP:
             raise ConfigError(f"{command} {id!r}: not possible with the own ship")

@@ -16,6 +16,7 @@ from .ros import fill, read
 
 _TIME = ("sec", "nanosec")
 DEPTH = 100  #: messages of a queue; ten are too few when a machine stalls
+DEPTH_IN = 1000  #: of those that come in: what does not fit gets lost without a word
 
 
 class Ros2:
@@ -54,7 +55,7 @@ class Ros2:
                 self._publishers[row] = self._node.create_publisher(cls, row.topic, qos), cls
         for row in incoming:
             if (cls := classes[row]) is not None:
-                self._node.create_subscription(cls, row.topic, self._callback(row, receive), qos)
+                self._node.create_subscription(cls, row.topic, self._callback(row, receive), QoSProfile(depth=DEPTH_IN))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="usv_gym ros2", daemon=True)
