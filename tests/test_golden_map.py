@@ -18,6 +18,7 @@ from usv_gym.render.primitives import Scene
 from usv_gym.render.pygame_view import View, render, save_png
 from usv_gym.render.scene import History, scene_from_snapshot
 from usv_gym.world import state
+from usv_gym.world.land import Coast, Polygon
 
 GOLDEN = Path(__file__).parent / "golden"
 SIZE, VIEW = (820, 560), View(20.0, 0.0, 0.75)
@@ -29,8 +30,14 @@ def one_of_everything() -> Scene:
     history = History()
     for second in range(0, 61, 2):
         scene = scene_from_snapshot(_world(second), ["own", "Nordlys", "Aurora", "Skarv"], history, half_width=300.0,
-                                    status=("golden", "seed 1"))  # fmt: skip
+                                    status=("golden", "seed 1"), coast=_coast())  # fmt: skip
     return scene
+
+
+def _coast() -> Coast:
+    """A shore in the south east with a lake, cut by the edge of the map."""
+    shore = np.array([(-160, 130), (-190, 60), (-260, 20), (-330, 60), (-900, 300), (-900, 900), (-80, 900), (-120, 250)])
+    return (Polygon(shore.astype(float), (np.array([(-230.0, 120.0), (-215.0, 170.0), (-250.0, 150.0)]),)),)
 
 
 def _world(second: int) -> Any:

@@ -173,7 +173,7 @@ def test_target_table_by_hand():
     assert (fixed.id, fixed.type, fixed.sensors) == ("T09", "fixed", "RL")
     assert fixed.bearing == pytest.approx(math.degrees(math.atan2(-40.0, 100.0)) % 360.0)
     assert (fixed.cpa, fixed.tcpa) == (pytest.approx(40.0), pytest.approx(20.0))
-    assert (ship.id, ship.type, ship.encounter, ship.sensors) == ("T07", "vessel", "GW", "AR")  # it is to starboard
+    assert (ship.id, ship.type, ship.encounter, ship.sensors) == ("T07", "vessel", "give way", "AR")  # it is to starboard
     assert (ship.bearing, ship.range) == (pytest.approx(45.0), pytest.approx(300.0 * math.sqrt(2.0)))
     assert (ship.cpa, ship.tcpa) == (pytest.approx(0.0, abs=1e-6), pytest.approx(60.0))
 
@@ -196,8 +196,8 @@ def test_a_target_at_rest_relative_to_us_is_as_near_as_it_will_be():
 
 @pytest.mark.parametrize(
     ("position", "cog_deg", "sog", "encounter"),
-    [((600.0, 0.0), 180.0, 5.0, "HO"), ((300.0, -300.0), 90.0, 5.0, "SO"), ((300.0, 0.0), 0.0, 2.0, "OT"),
-     ((-300.0, 0.0), 0.0, 9.0, "OV"), ((300.0, 0.0), 0.0, 9.0, "")],
+    [((600.0, 0.0), 180.0, 5.0, "head on"), ((300.0, -300.0), 90.0, 5.0, "stand on"), ((300.0, 0.0), 0.0, 2.0, "overtaking"),
+     ((-300.0, 0.0), 0.0, 9.0, "overtaken"), ((300.0, 0.0), 0.0, 9.0, "")],
 )  # fmt: skip
 def test_the_table_names_the_encounter(position, cog_deg, sog, encounter):
     w = a_world()[0]

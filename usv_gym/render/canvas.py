@@ -152,6 +152,31 @@ class Canvas:
         if line is not None:
             self._stroke(shape, line, style, closed=True)
 
+    def area(self, shell: Points, holes: Sequence[Points], role: str, hole_role: str) -> None:
+        """A large outline with holes in it; corners that fall on the same pixel are drawn once."""
+        style, fill, line = self.style(role)
+        for ring, colour in ((shell, fill), *((hole, self.style(hole_role)[1]) for hole in holes)):
+            corners = (_pixels(clip(ring, self.frame)) * self.ss).tolist()
+            if len(corners) < 3:
+                continue
+            if colour is not None:
+                self.pg.draw.polygon(self.surface, colour[:3], corners)
+            if line is not None:
+                self.pg.draw.lines(self.surface, line[:3], True, corners, self._width(style))
+
+    def fringe(self, ring: Points, width: float, role: str) -> None:
+        """What lies within ``width`` of a closed outline: discs along it, near enough to look like one band."""
+        fill = self.style(role)[1]
+        if fill is None or width < 1.0:
+            return
+        line = np.vstack((ring, ring[:1]))
+        along = np.concatenate(((0.0,), np.hypot(*np.diff(line, axis=0).T).cumsum()))
+        at = np.arange(0.0, along[-1], 0.25 * width)[:20000]
+        centres = np.column_stack([np.interp(at, along, line[:, k]) for k in range(2)])
+        x0, y0, x1, y1 = self.frame
+        for x, y in (seen(centres, (x0 - width, y0 - width, x1 + width, y1 + width)) * self.ss).tolist():
+            self.pg.draw.circle(self.surface, fill[:3], (x, y), width * self.ss)
+
     def polyline(self, points: Points, role: str, arrow: bool = False) -> None:
         """Line through points [n, 2]."""
         style, _, line = self.style(role)
@@ -300,6 +325,12 @@ def _thin(points: Points) -> Points:
     return points[keep]
 
 
+def _pixels(points: Points) -> Points:
+    """An outline without corners that are within a pixel of the one before."""
+    whole = np.rint(points)
+    return points[(whole != np.roll(whole, 1, axis=0)).any(axis=1)]
+
+
 def dashes(points: Points, on: float, off: float, frame: Frame) -> Points:
     """Pieces of a line that are drawn when ``on`` pixels are, then ``off`` are not: [n, 4] x, y, x, y in the frame."""
     along = np.concatenate(((0.0,), np.hypot(*np.diff(points, axis=0).T).cumsum()))
@@ -335,18 +366,15 @@ def clip(points: Points, frame: Frame) -> Points:
     if where != ACROSS:
         return points if where == INSIDE else points[:0]
     x0, y0, x1, y1 = frame
-    shape = points.tolist()
+    shape = points
     for axis, bound, sign in ((0, x0, 1.0), (0, x1, -1.0), (1, y0, 1.0), (1, y1, -1.0)):
-        out: list[list[float]] = []
-        for k, q in enumerate(shape):
-            p = shape[k - 1]
-            dp, dq = sign * (p[axis] - bound), sign * (q[axis] - bound)
-            if (dp < 0.0) != (dq < 0.0):
-                f = dp / (dp - dq)
-                out.append([p[0] + f * (q[0] - p[0]), p[1] + f * (q[1] - p[1])])
-            if dq >= 0.0:
-                out.append(q)
-        shape = out
-        if not shape:
+        # for each edge p -> q: where it crosses the bound, then q if that is inside
+        p, q = np.roll(shape, 1, axis=0), shape
+        dp, dq = sign * (p[:, axis] - bound), sign * (q[:, axis] - bound)
+        crosses, inside = (dp < 0.0) != (dq < 0.0), dq >= 0.0
+        share = np.divide(dp, dp - dq, out=np.zeros_like(dp), where=crosses)
+        both = np.stack((p + share[:, None] * (q - p), q), axis=1)
+        shape = both[np.column_stack((crosses, inside))]
+        if not len(shape):
             return points[:0]
-    return np.array(shape)
+    return shape

@@ -10,11 +10,12 @@ import numpy as np
 from ..units import DEG, KNOT, wrap_360
 from . import shapes
 from .panel import clock, target_name, target_rows, velocity_of
-from .primitives import LAYERS, Circle, Dots, Label, Panel, Points, Polygon, Polyline, Primitive, Scene
+from .primitives import LAYERS, Area, Circle, Dots, Fringe, Label, Panel, Points, Polygon, Polyline, Primitive, Scene
 from .sea import DESCRIPTORS, HULLS, OBSTACLES, Detection, Sea, Trail
 
 DOMAIN = (4.0, 1.6)  #: semi-axes of the ship domain along and across, in lengths
 CPA_SECONDS, CPA_METRES = 300.0, 150.0  #: closest approaches to come are marked if this soon and this near
+SHALLOWS = ((90.0, "shallow"), (35.0, "shoal"))  #: [m] from the shore
 VECTOR_SECONDS = 60.0  #: a speed vector shows where a vessel is after this time
 HULL_PX, OWN_PX, OBSTACLE_PX, AIS_PX = 16.0, 24.0, 10.0, 14.0  #: smallest sizes on the picture
 
@@ -51,9 +52,8 @@ def compose(
         whether to mark the closest approach to come.
     """
     layers: Layers = {name: [] for name in LAYERS}
+    _land(layers, sea)
     _shadows(layers["shadows"], sea)
-    for shell, *holes in sea.land:
-        layers["land"] += [Polygon(shell, "land"), *(Polygon(hole, "lake") for hole in holes)]
     _rings(layers, sea, extent)
     for j, trail in sorted(trails.items()):
         _trail(layers, trail, own=j == sea.own)
@@ -77,6 +77,15 @@ def compose(
     for name in hide:
         layers[name] = []
     return Scene(layers, panel, extent)
+
+
+def _land(layers: Layers, sea: Sea) -> None:
+    """Land with its lakes, and the water near it in two shades: by the distance from the shore, for there are no soundings."""
+    for width, role in SHALLOWS:
+        layers["shallows"] += [Fringe(ring, width, role) for rings in sea.land for ring in rings]
+    layers["land"] += [Area(shell, tuple(holes), "land") for shell, *holes in sea.land]
+    if len(sea.echoes):
+        layers["land"].append(Dots(sea.echoes, "echo", 4.0))
 
 
 def hull(sea: Sea, j: int) -> Points:

@@ -42,6 +42,10 @@ def _style(day: str, dark: str, night: str, width: float = 1.0, dash: tuple[floa
 STYLES: dict[str, Style] = {
     # paper
     "sea":            _style("#d7ebf0 -",         "#0a0d10 -",         "#070504 -"),
+    "shallow":        _style("#b5d8f2 -",         "#0d2130 -",         "#0e0906 -"),
+    "shoal":          _style("#84bbea -",         "#123a56 -",         "#170e09 -"),
+    "land":           _style("#cdbd7c #4d4426",   "#6b5f3a #b8a76a",   "#35240f #7d5a2c", 1.4),
+    "echo":           _style("#b4530f -",         "#ffa64d -",         "#b05820 -"),
     "grid":           _style("- #bccfd6",         "- #262c31",         "- #1f1512"),
     "text":           _style("#d7ebf0 #12181c",   "#0a0d10 #e6edf0",   "#070504 #c98a62"),
     "text_muted":     _style("#d7ebf0 #566770",   "#0a0d10 #93a1a8",   "#070504 #85573e"),
@@ -83,7 +87,6 @@ STYLES: dict[str, Style] = {
     "vector":         _style("- #1f8a55",         "- #3ed08a",         "- #83702c", 1.4),
     "iceberg":        _style("#ffffff #5b7f98",   "#dbe9f2 #8fb0c6",   "#57443a #8d6a56", 1.1),
     "iceberg_shade":  _style("#bcd5e6 -",         "#7fa0b8 -",         "#38291f -"),
-    "land":           _style("#e2d3a6 #6b5f3c",   "#4a4632 #b5a878",   "#2b1d10 #6a4e2c", 1.3),
     "lake":           _style("#c9e1ea #6b5f3c",   "#20303a #b5a878",   "#17100d #6a4e2c", 1.0),
     "islet":          _style("#c9ba79 #4d4426",   "#95824c #d8c88f",   "#4a3618 #86683a", 1.2),
     "islet_shade":    _style("#a9985a -",         "#6f6035 -",         "#33240f -"),
@@ -115,6 +118,8 @@ STYLES: dict[str, Style] = {
     "panel_box":      _style("#dcebef -",         "#22282c -",         "#17100d -"),
     "panel_grid":     _style("- #bccfd6",         "- #363f45",         "- #2b1c16"),
     "panel_grid_fill": _style("#a9bdc5 -",        "#363f45 -",         "#2b1c16 -"),
+    "act":            _style("- #c01843",         "- #ff7d9c",         "- #d04030"),
+    "keep":           _style("- #1f7a4d",         "- #3ed08a",         "- #a58c38"),
     "chip":           _style("#3f5964 -",         "#9db0b9 -",         "#8a5740 -"),
     "chip_text":      _style("- #ffffff",         "- #15191c",         "- #0b0807"),
     "chip_off":       _style("- #a9bdc5",         "- #39434a",         "- #33211a"),

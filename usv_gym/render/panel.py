@@ -11,10 +11,10 @@ from ..world.encounter import Encounter, encounters
 from .primitives import Panel, Plot, Points, Series, TargetRow
 from .sea import DESCRIPTORS, Detection, Sea
 
-#: what a target is to the own ship, in two letters
+#: what a target is to the own ship
 ENCOUNTERS = {
-    Encounter.SAFE: "", Encounter.HEAD_ON: "HO", Encounter.CROSSING_GIVE_WAY: "GW", Encounter.CROSSING_STAND_ON: "SO",
-    Encounter.OVERTAKING: "OT", Encounter.OVERTAKEN: "OV",
+    Encounter.SAFE: "", Encounter.HEAD_ON: "head on", Encounter.CROSSING_GIVE_WAY: "give way",
+    Encounter.CROSSING_STAND_ON: "stand on", Encounter.OVERTAKING: "overtaking", Encounter.OVERTAKEN: "overtaken",
 }  # fmt: skip
 
 

@@ -11,14 +11,16 @@ from .panel import clock
 from .primitives import Panel, Plot, Points, Series, TargetRow
 from .shapes import nice_step
 
-WIDTH = 380  #: [px]
+WIDTH = 402  #: [px]
 PAD = 13.0
 ROW = 20.0  #: [px] height of a row of the table
 LEAST = 3  #: rows of the table that are worth more than a plot
 PLOT = 112.0  #: [px] least height of a plot
 #: columns of the table: title, offset from the left, alignment
-COLUMNS = (("ID", 0.0, 0.0), ("TYPE", 36.0, 0.0), ("ENC", 82.0, 0.0), ("BRG", 142.0, 1.0), ("RNG m", 194.0, 1.0),
-           ("CPA m", 244.0, 1.0), ("TCPA s", 298.0, 1.0), ("BY", 310.0, 0.0))  # fmt: skip
+COLUMNS = (("ID", 0.0, 0.0), ("TYPE", 34.0, 0.0), ("RULE", 78.0, 0.0), ("BRG", 174.0, 1.0), ("RNG m", 222.0, 1.0),
+           ("CPA m", 268.0, 1.0), ("TCPA s", 318.0, 1.0), ("BY", 330.0, 0.0))  # fmt: skip
+#: encounters in which the own ship has to act; in the others it holds its course
+ACT = ("head on", "give way", "overtaking")
 
 
 def draw_panel(canvas: Canvas, panel: Panel, box: tuple[float, float, float, float]) -> None:
@@ -73,10 +75,11 @@ def _table(canvas: Canvas, rows: tuple[TargetRow, ...], left: float, right: floa
         canvas.text(title, (left + x, y), "text_muted", 11, align)
     y += 17.0
     for row in shown:
-        for text, (_, x, align) in zip(_cells(row), COLUMNS, strict=False):
-            canvas.text(text, (left + x, y), "text", 12, align)
+        for text, (title, x, align) in zip(_cells(row), COLUMNS, strict=False):
+            role = "text" if title != "RULE" or not row.encounter else "act" if row.encounter in ACT else "keep"
+            canvas.text(text, (left + x, y), role, 12, align)
         for k, letter in enumerate("ARL"):
-            _chip(canvas, letter, letter in row.sensors, left + 310.0 + 15.0 * k, y)
+            _chip(canvas, letter, letter in row.sensors, left + COLUMNS[-1][1] + 15.0 * k, y)
         y += ROW
     return y + 3.0
 

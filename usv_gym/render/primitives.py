@@ -16,7 +16,7 @@ Points = NDArray[np.float64]
 
 #: drawing order, bottom first
 LAYERS = (
-    "shadows", "land", "rings", "tracks", "route", "detections", "obstacles", "vessels", "symbols", "own", "labels"
+    "shallows", "shadows", "land", "rings", "tracks", "route", "detections", "obstacles", "vessels", "symbols", "own", "labels"
 )  # fmt: skip
 
 
@@ -29,6 +29,24 @@ class Polygon:
     anchor: tuple[float, float] = (0.0, 0.0)
     size: float = 0.0
     min_px: float = 0.0
+
+
+@dataclass(frozen=True)
+class Area:
+    """A large filled outline with holes, always to scale: land with its lakes."""
+
+    shell: Points
+    holes: tuple[Points, ...]
+    role: str
+
+
+@dataclass(frozen=True)
+class Fringe:
+    """What lies within ``width`` [m] of a closed outline."""
+
+    ring: Points
+    width: float
+    role: str
 
 
 @dataclass(frozen=True)
@@ -75,7 +93,7 @@ class Label:
     fixed: bool = False
 
 
-Primitive = Polygon | Polyline | Circle | Dots | Label
+Primitive = Polygon | Area | Fringe | Polyline | Circle | Dots | Label
 
 
 @dataclass(frozen=True)
@@ -105,7 +123,7 @@ class TargetRow:
 
     id: str
     type: str
-    encounter: str  # HO, GW, SO, OT, OV as COLREGs see it by its motion; empty if none or unknown
+    encounter: str  # as the COLREGs see it by its motion, whatever the distance; empty if none or unknown
     bearing: float  # true, [deg]
     range: float  # [m]
     cpa: float

@@ -21,7 +21,7 @@ from .labels import Box, Placed, Request, place
 from .palette import PALETTES
 from .panel_view import WIDTH as PANEL_WIDTH
 from .panel_view import draw_panel
-from .primitives import LAYERS, Circle, Dots, Label, Points, Polygon, Polyline, Primitive, Scene
+from .primitives import LAYERS, Area, Circle, Dots, Fringe, Label, Points, Polygon, Polyline, Primitive, Scene
 from .shapes import nice_step
 
 SIZES = (12, 11)  #: [px] of the first and the second line of a label
@@ -163,12 +163,15 @@ class _Map:
         """Everything, bottom up; labels last, for they look for free places."""
         self.canvas.box((0, 0, *self.canvas.size), "sea")
         layers = self.scene.layers
+        for p in layers.get("shallows", []):
+            if isinstance(p, Fringe):
+                self.canvas.fringe(self.px(p.ring), p.width * self.view.scale, p.role)
         for p in layers.get("shadows", []):
             if isinstance(p, Polygon):
                 self.canvas.tint(self.px(p.points), p.role)
         self._grid()
         for name in LAYERS:
-            if name not in ("shadows", "labels"):
+            if name not in ("shallows", "shadows", "labels"):
                 for primitive in layers.get(name, []):
                     self._primitive(primitive, name in ("obstacles", "vessels", "own"))
         if min(self.width, self.height) >= BARE:
@@ -190,6 +193,8 @@ class _Map:
             if body:
                 (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
                 self.bodies.append((float(x0), float(y0), float(x1), float(y1)))
+        elif isinstance(p, Area):
+            self.canvas.area(self.px(p.shell), [self.px(hole) for hole in p.holes], p.role, "lake")
         elif isinstance(p, Polyline):
             self.canvas.polyline(self.px(p.points), p.role, p.arrow)
         elif isinstance(p, Circle):

@@ -10,7 +10,7 @@ import numpy as np
 from ..world.land import Coast
 from .compose import compose
 from .panel import panel, plots
-from .primitives import Primitive, Scene
+from .primitives import Points, Primitive, Scene
 from .scene_episode import scene_from_episode
 from .sea import AisReport, Detection, History, Sea, sides
 
@@ -94,6 +94,7 @@ def sea_from_record(world: Any, names: Sequence[str] = (), observer: int = 0, co
         acceptance=float(routes["radius"][own]),
         radar_range=_range(world, "radar"),
         lidar_range=_range(world, "lidar"),
+        echoes=_echoes(world["picture"], observer),
         thrust=_thrust(world["plants"], int(v["plant"][own])),
         land=[polygon.rings for polygon in coast],
     )
@@ -119,6 +120,11 @@ def _detections(p: Any, o: int) -> list[Detection]:
         )
         for s in np.flatnonzero(p["id"][o])
     ]
+
+
+def _echoes(p: Any, o: int) -> Points:
+    echoes: Points = p["land"][o][p["land_sensors"][o] != 0]
+    return echoes
 
 
 def _reports(ais: Any, o: int) -> list[AisReport]:

@@ -89,6 +89,7 @@ class Sea:
     radar_range: float = 0.0  # [m], 0: no such sensor
     lidar_range: float = 0.0
     land: Sequence[Sequence[Points]] = ()  # of each polygon the shell [n, 2] and its holes
+    echoes: Points = field(default_factory=lambda: np.zeros((0, 2)))  # of land, as radar and LiDAR have them {n} [m]
     thrust: tuple[float, ...] = ()  # demand in [-1, 1]: port and starboard, or one for all
 
     @property

@@ -241,6 +241,8 @@ def _header(episode: Episode) -> dict[str, Any]:
         "format": "usv-replay", "version": VERSION, "title": title(meta), "own": own, "vessels": episode.vessels,
         "sources": episode.sources, "names": [episode.name(s) for s in range(episode.sources)],
         "kinds": meta["kinds"], "mmsi": meta["mmsi"], "ais_class": meta["ais_class"],
+        # rings of north, east, north, .. [m], the shell of a polygon first
+        "land": [[np.round(np.ravel(ring), 1) for ring in rings] for rings in meta.get("land") or ()],
         "length": episode.length, "beam": episode.beam, "radius": episode.radius,
         "route": routes[own] if own < len(routes) else [], "acceptance": radii[own] if own < len(radii) else 0,
         **ranges, "tdm_period": sensors.get("tdm", {}).get("period") or 1.0,

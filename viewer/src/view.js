@@ -5,6 +5,7 @@ import {
   MeshLambertMaterial, Scene, Vector3, WebGLRenderer,
 } from "three";
 import { Labels } from "./labels.js";
+import { landOf } from "./land.js";
 import { Line, RESOLUTION } from "./lines.js";
 import { HAZE, HAZE_DENSITY, SUN, makeSea, makeSky } from "./sea.js";
 import { HULL_NAMES, OBSTACLE_NAMES, circle, foam, heightOf, hullOf, obstacleOf, waterline } from "./shapes.js";
@@ -15,7 +16,7 @@ export const SIDES = { port: "#e5322d", starboard: "#15a05a", bow: "#2f6fe0", ce
 
 /** Groups of the scene: caption, and whether they are shown at first. */
 export const GROUPS = {
-  vessels: ["Ships", true], obstacles: ["Obstacles", true], detections: ["Detections", true], covariance: ["Uncertainty 2σ", false],
+  land: ["Land", true], vessels: ["Ships", true], obstacles: ["Obstacles", true], detections: ["Detections", true], covariance: ["Uncertainty 2σ", false],
   labels: ["Labels", true], ais: ["AIS symbols", true], shadows: ["Radar shadow", true], rings: ["Range rings", true],
   route: ["Route", true], track: ["Own track", true], tracks: ["Ship tracks", false], vectors: ["Speed vectors", true],
   thrust: ["Thrust", true], closest: ["Closest", false],
@@ -90,6 +91,7 @@ export class View {
       this.reach = Math.max(320, 0.62 * Math.hypot(...h.route.reduce(([a, b], [n, e]) => [Math.max(a, Math.abs(n)), Math.max(b, Math.abs(e))], [0, 0])) * 2);
       this.rig.home(h.length[h.own], this.reach);
     }
+    this.makeLand(h);
     this.makeRoute(h);
     this.makeTracks();
   }
@@ -124,6 +126,13 @@ export class View {
     this.selection = new Line("#ffffff", 2.5, { order: 20, through: true });
     this.scene.add(this.selection);
     this.discs = [];
+  }
+
+  makeLand(h) {
+    if (this.landDrawn === h.land?.length) return;
+    this.landDrawn = h.land?.length;
+    this.groups.land.clear();
+    for (const rings of h.land ?? []) this.groups.land.add(landOf(rings, this.solid));
   }
 
   makeRoute(h) {
