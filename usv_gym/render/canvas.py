@@ -328,7 +328,8 @@ def _thin(points: Points) -> Points:
 def _pixels(points: Points) -> Points:
     """An outline without corners that are within a pixel of the one before."""
     whole = np.rint(points)
-    return points[(whole != np.roll(whole, 1, axis=0)).any(axis=1)]
+    kept: Points = points[(whole != np.roll(whole, 1, axis=0)).any(axis=1)]
+    return kept
 
 
 def dashes(points: Points, on: float, off: float, frame: Frame) -> Points:

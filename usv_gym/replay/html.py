@@ -115,7 +115,10 @@ def pack(episode: Episode, *, since: float = -math.inf, stride: int = 1, thin: i
             order = 2 if not prefix and name in _SMOOTH else 1
             index.append([prefix + name, rows, count, QUANTUM[name], order])
             streams.append(_encode(values.ravel(), QUANTUM[name], order))
-    header = json.dumps({**_header(episode), "columns": index}, separators=(",", ":"), allow_nan=False).encode()
+    head = {**_header(episode), "columns": index}
+    if since == -math.inf:  # what never changes is sent once: rings of north, east, north, .. [m], a polygon's shell first
+        head["land"] = plain([[np.round(np.ravel(ring), 1) for ring in rings] for rings in episode.meta.get("land") or ()])
+    header = json.dumps(head, separators=(",", ":"), allow_nan=False).encode()
     return zlib.compress(struct.pack("<I", len(header)) + header + b"".join(streams), 9)
 
 
@@ -241,8 +244,6 @@ def _header(episode: Episode) -> dict[str, Any]:
         "format": "usv-replay", "version": VERSION, "title": title(meta), "own": own, "vessels": episode.vessels,
         "sources": episode.sources, "names": [episode.name(s) for s in range(episode.sources)],
         "kinds": meta["kinds"], "mmsi": meta["mmsi"], "ais_class": meta["ais_class"],
-        # rings of north, east, north, .. [m], the shell of a polygon first
-        "land": [[np.round(np.ravel(ring), 1) for ring in rings] for rings in meta.get("land") or ()],
         "length": episode.length, "beam": episode.beam, "radius": episode.radius,
         "route": routes[own] if own < len(routes) else [], "acceptance": radii[own] if own < len(radii) else 0,
         **ranges, "tdm_period": sensors.get("tdm", {}).get("period") or 1.0,

@@ -129,10 +129,9 @@ export class View {
   }
 
   makeLand(h) {
-    if (this.landDrawn === h.land?.length) return;
-    this.landDrawn = h.land?.length;
+    if (!h.land) return; // a later piece of a live episode
     this.groups.land.clear();
-    for (const rings of h.land ?? []) this.groups.land.add(landOf(rings, this.solid));
+    for (const rings of h.land) this.groups.land.add(landOf(rings, this.solid));
   }
 
   makeRoute(h) {
