@@ -26,6 +26,8 @@ from usv_gym.replay.html import QUANTUM, pack, unpack, write_replay
 from usv_gym.replay.recorder import Recorder
 
 SECONDS = 1200
+#: one island with a lake, as an archive has it
+LAND = [[[[400.12, -900], [700, -900], [700, 900], [400, 900]], [[500, 0], [550, 50], [500, 90]]]]
 VIEWER = Path(__file__).parents[1] / "viewer"
 
 
@@ -67,7 +69,7 @@ def episode(seconds=SECONDS):
             send(w, 1, error=tuple(rng.normal(0, 3, 2)))
     recorder.event(300.0, "waypoint_reached", 0, "1 of 2")
     return recorder.finish(names=NAMES, scenario={"name": "<twenty> minutes"}, seed=3, policy="hold", vessel="odin",
-                           outcome={"outcome": "time_limit"})  # fmt: skip
+                           outcome={"outcome": "time_limit"}, land=LAND)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +114,14 @@ def test_the_data_are_the_episode_within_half_a_quantum(replay):
         np.testing.assert_allclose(columns[name], values, rtol=0, atol=0.5 * quantum + 1e-7, err_msg=name)
     assert [c[3] for c in header["columns"] if c[0] == "north"] == [0.01]
     assert np.isnan(columns["d_cog"][0, -1])
+
+
+def test_land_travels_once():
+    header, _ = unpack(pack(episode(20)))
+    shell, lake = header["land"][0]
+    assert shell == [400.1, -900.0, 700.0, -900.0, 700.0, 900.0, 400.0, 900.0]
+    assert lake == [500.0, 0.0, 550.0, 50.0, 500.0, 90.0]
+    assert "land" not in unpack(pack(episode(20), since=10.0))[0]
 
 
 def test_thrust_is_a_share_of_the_largest_and_has_a_side():
@@ -310,7 +320,7 @@ def test_every_group_can_be_hidden(page):
     # thrusters push in this one
     page.run("(replay.episode.series.thrust_x.rows.forEach(row => row.fill(1)), replay.dirty = true)")
     names = page.run("Array.from(document.querySelectorAll('#groups input'), box => box.id)")
-    assert len(names) == 14
+    assert len(names) == 15
     for name in names:
         near = name in ("show-vessels", "show-ais", "show-tracks", "show-vectors")
         view = (
