@@ -9,12 +9,13 @@ import { HULL_NAMES, OBSTACLE_NAMES } from "./shapes.js";
 const $ = (id) => document.getElementById(id);
 const SPEEDS = [0.25, 0.5, 1, 2, 5, 10, 20, 50];
 const EVENTS = {
-  cpa: ["Closest to", "#c01843"], collision: ["Collision with", "#d1001f"], waypoint_reached: ["Waypoint", "#2461cf"], route_done: ["Route done", "#2461cf"],
+  cpa: ["Closest to", "#c01843"], collision: ["Collision with", "#d1001f"], grounding: ["Grounding", "#d1001f"], waypoint_reached: ["Waypoint", "#2461cf"], route_done: ["Route done", "#2461cf"],
   spawned: ["Appears", "#15803d"], removed: ["Removed", "#566770"], moved: ["Moved", "#566770"], waypoints_set: ["New route", "#566770"],
   ais_on: ["AIS on", "#0a6f6c"], ais_off: ["AIS off", "#0a6f6c"], radar_outage: ["Radar outage", "#b45309"], lidar_outage: ["LiDAR outage", "#b45309"],
   ais_jammed: ["AIS jammed", "#b45309"], gnss_frozen: ["GNSS frozen", "#b45309"],
 };
-const SAYS = new Set(["waypoint_reached", "cpa", "radar_outage", "lidar_outage", "ais_jammed", "gnss_frozen"]);
+const QUIET = new Set(["collision", "spawned", "removed", "moved", "waypoints_set", "ais_on", "ais_off", "route_done"]); // their text is who
+const styleOf = (e) => EVENTS[e.kind] ?? [e.kind.replaceAll("_", " "), e.text === "begins" || e.text === "ends" ? "#b45309" : "#566770"];
 
 class Page {
   constructor(live) {
@@ -192,10 +193,10 @@ class Page {
     if (list.length === this.listed && !this.live) return;
     [this.listed, this.now] = [list.length, null];
     $("events").replaceChildren(...list.map((e) => {
-      const [caption, colour] = EVENTS[e.kind] ?? [e.kind.replaceAll("_", " "), "#566770"];
+      const [caption, colour] = styleOf(e);
       const button = document.createElement("button");
       const dot = Object.assign(document.createElement("i"), { style: `background:${colour}` });
-      const who = e.id >= 0 ? h.names[e.id] : "", detail = SAYS.has(e.kind) ? e.text : "";
+      const who = e.id >= 0 ? h.names[e.id] : "", detail = QUIET.has(e.kind) ? "" : e.text;
       const what = e.kind === "waypoint_reached" ? `${who}: waypoint ${detail}` : e.kind === "cpa" ? `${detail} to ${who}` : `${caption} ${who} ${detail}`;
       const time = Object.assign(document.createElement("time"), { textContent: clock(e.t) });
       button.append(time, dot, Object.assign(document.createElement("span"), { textContent: what.trim() }));
@@ -209,7 +210,7 @@ class Page {
     $("marks").replaceChildren(...list.map((e) => {
       const mark = document.createElement("i");
       mark.style.left = `${(100 * (e.t - start)) / (end - start || 1)}%`;
-      mark.style.background = (EVENTS[e.kind] ?? [0, "#566770"])[1];
+      mark.style.background = styleOf(e)[1];
       return mark;
     }));
   }
