@@ -112,3 +112,19 @@ def test_a_baseline_that_reads_the_picture_keeps_off_the_land():
     outcomes = voyages("NearShore", "avoid", 30)
     assert "grounding" not in outcomes
     assert outcomes.count("arrival") > 20
+
+
+def test_learned_policies_tell_land_from_targets():
+    """The part `land` goes on as it is; it is never taken for targets."""
+    import torch
+
+    from usv_gym.policies.networks import TargetEncoder
+
+    look = TargetEncoder(gym.spaces.Box(-1.0, 1.0, (12 + 8 * 9 + 2 * 36,), np.float32), 16, 1852.0, 8)
+    sea = torch.zeros(1, 156)
+    shore = sea.clone()
+    shore[:, 84:] = 1.0
+    a, b = look(sea), look(shore)
+    assert look.features_dim == a.shape[1] == 12 + 16 + 72
+    assert (a[:, :28] == b[:, :28]).all()
+    assert (b[:, 28:] == 1.0).all()

@@ -43,7 +43,7 @@ class Network(Model):
             return arguments
         from .networks import TargetEncoder
 
-        look = {"width": self.encoder, "range_scale": task.range_scale}
+        look = {"width": self.encoder, "range_scale": task.range_scale, "targets": task.targets}
         return {**arguments, "features_extractor_class": TargetEncoder, "features_extractor_kwargs": look}
 
 

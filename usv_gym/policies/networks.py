@@ -18,22 +18,28 @@ class TargetEncoder(BaseFeaturesExtractor):
     """Own features, and what matters most among the targets: one small network looks at each, and the largest wins.
 
     It sees a target with the own ship's features, its direction, and its closeness on three scales; whatever it learns of one
-    slot holds for all, and the order of the targets does not matter.
+    slot holds for all, and the order of the targets does not matter.  Sectors of land go on as they are.
     """
 
-    def __init__(self, space: gym.Space[Any], width: int, range_scale: float) -> None:
-        super().__init__(space, N_OWN + width)
+    def __init__(self, space: gym.Space[Any], width: int, range_scale: float, targets: int) -> None:
+        self.targets = N_OWN + targets * N_TARGET  # where they end
+        land = gym.spaces.flatdim(space["land"]) if isinstance(space, gym.spaces.Dict) and "land" in space.spaces else 0
+        if not isinstance(space, gym.spaces.Dict):
+            land = gym.spaces.flatdim(space) - self.targets
+        super().__init__(space, N_OWN + width + land)
         self.range_scale = range_scale
         self.each = nn.Sequential(
             nn.Linear(N_OWN + N_TARGET + 2 + len(_REACHES), width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
         )
 
     def forward(self, observations: Any) -> torch.Tensor:
-        """Features [B, N_OWN + width] of flat or Dict observations."""
+        """Features [B, N_OWN + width + sectors of land] of flat or Dict observations."""
         if isinstance(observations, dict):
             own, targets = observations["own"], observations["targets"]
+            land = [observations["land"].flatten(1)] if "land" in observations else []
         else:
-            own, targets = observations[:, :N_OWN], observations[:, N_OWN:].unflatten(1, (-1, N_TARGET))
+            own, land = observations[:, :N_OWN], [observations[:, self.targets :]]
+            targets = observations[:, N_OWN : self.targets].unflatten(1, (-1, N_TARGET))
         position = targets[..., 1:3] * self.range_scale
         distance = torch.linalg.vector_norm(position, dim=-1, keepdim=True)
         features = torch.cat(
@@ -45,4 +51,4 @@ class TargetEncoder(BaseFeaturesExtractor):
             ],
             dim=-1,
         )
-        return torch.cat([own, (self.each(features) * targets[..., :1]).amax(1)], dim=-1)
+        return torch.cat([own, (self.each(features) * targets[..., :1]).amax(1), *land], dim=-1)
