@@ -36,13 +36,14 @@ def validate(
 @app.command("list")
 def list_(
     what: Annotated[
-        str, typer.Argument(help="scenarios, suites, vessels, sensors, policies or environments; default: all")
+        str, typer.Argument(help="scenarios, suites, vessels, sensors, policies, requirements or environments; default: all")
     ] = "all",
 ) -> None:
     """List what ships with the package."""
     from rich.console import Console
     from rich.table import Table
 
+    from ..colregs.requirements import CATALOGUE, read_requirements
     from ..config import ConfigError, read_yaml, suggestion
     from ..envs import ENVIRONMENTS
     from ..policies import POLICIES, THRUST_LOG
@@ -52,6 +53,7 @@ def list_(
              for kind in ("scenarios", "suites", "vessels", "sensors")}  # fmt: skip
     kinds["policies"] = {name: text for name, (_, text) in POLICIES.items()}
     kinds["policies"][THRUST_LOG] = "a recorded mission, row by row, blind"
+    kinds["requirements"] = {id: one.text for id, one in read_requirements(CATALOGUE).items()}
     kinds["environments"] = {name: text for name, (text, _) in ENVIRONMENTS.items()}
     if what != "all" and what not in kinds:
         raise ConfigError(f"list {what!r}: unknown kind{suggestion(what, [*kinds, 'all'])}")
