@@ -391,7 +391,7 @@ def _write_nothing_yet(w: Any) -> None:
     w["safety"]["collided_with"] = -1
     w["safety"]["land_distance"] = w["safety"]["land_closest"] = math.inf
     w["land_id"] = w["chart_id"] = w["tracks"]["land_us"] = -1
-    w["tracks"]["land"] = w["picture"]["land"] = w["picture"]["chart"] = math.nan
+    w["tracks"]["land"] = w["picture"]["land"] = w["picture"]["chart"] = w["picture"]["chart_place"] = math.nan
     w["ais"]["last_tick"] = w["ais"]["due_tick"] = w["ais"]["inbox_stamp_us"] = -1
     w["tracks"]["scan_bias_us"] = w["tracks"]["scan_due"] = -1
     for o, j in enumerate(w["observer"]):

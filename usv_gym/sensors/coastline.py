@@ -25,6 +25,7 @@ from ..world.shore import (
 from ..world.state import DESCRIPTOR_LAND, LIDAR, RADAR, L, T
 
 CHART_REACH = 1852.0  #: [m] how far around the own ship the chart is read
+CHART_STEP = 10.0  #: [m] from where it was read last, it is read again
 RAYS = 5  #: per sector, where objects hide land
 #: neighbouring echoes belong to two stretches of coast if one is so many times as far as the other and that much farther [m];
 #: along a straight shore the ratio stays below 2.6 up to 18 times the distance abeam
@@ -133,11 +134,15 @@ def publish_land(w, land, o, tick):
     """Write land into the picture of observer o: echoes by sector (the LiDAR's first), the chart, stretches of coast."""
     p, t, pic = w.sensors, w.tracks, w.picture
     h = coast(land, w.chart_id)
-    if h != 0:
-        nearest_land(land, h, w.nav.position[o, 0], w.nav.position[o, 1], CHART_REACH, pic.chart[o])
+    north, east = w.nav.position[o, 0], w.nav.position[o, 1]
+    at = pic.chart_place[o]
+    if h != 0 and not math.hypot(north - at[0], east - at[1]) <= CHART_STEP:  # NaN: not read yet
+        at[0] = north
+        at[1] = east
+        nearest_land(land, h, north, east, CHART_REACH, pic.chart[o])
         for i in range(L):
-            pic.chart[o, i, 0] += w.nav.position[o, 0]
-            pic.chart[o, i, 1] += w.nav.position[o, 1]
+            pic.chart[o, i, 0] += north
+            pic.chart[o, i, 1] += east
     if coast(land, w.land_id) == 0:
         return
     now = tick * w.dt_us

@@ -50,6 +50,7 @@ def index_coast(coast: Sequence[Polygon]) -> Block:
         if there is no polygon, or a ring has fewer than three corners.
     """
     from .land_index import centres_on_land, cut, nearest_pieces
+    from .shore import CELLS, RUN
 
     edges = _edges(ring for polygon in coast for ring in polygon.rings)
     low = edges.reshape(-1, 2).min(axis=0)
@@ -75,13 +76,17 @@ def index_coast(coast: Sequence[Polygon]) -> Block:
     inside = np.zeros(rows * columns, np.int8)
     centres_on_land(first, pieces, n, e, side, rows, columns, inside)
     table = np.zeros((rows * columns + 1, 4))
-    start = 5 + table.size
+    start = CELLS + table.size
     table[:, 0] = start + 4 * first
     table[:-1, 1] = start + 4 * nearest
     # to be used as "nothing is nearer": less what rounding may do
     table[:-1, 2] = np.maximum(distance - side * math.sqrt(0.5) - 1e-6, 0.0)
     table[:-1, 3] = inside
-    return np.concatenate([[n, e, side, rows, columns], table.ravel(), pieces.ravel()])
+    runs = edges[np.minimum(np.arange(-(-len(edges) // RUN) * RUN), len(edges) - 1)].reshape(-1, RUN, 4)  # the last repeats
+    ends = runs.reshape(len(runs), -1, 2)
+    boxed = np.hstack([ends.min(axis=1), ends.max(axis=1), runs.reshape(len(runs), -1)])
+    header = [n, e, side, rows, columns, start + pieces.size, len(runs)]
+    return np.concatenate([header, table.ravel(), pieces.ravel(), boxed.ravel()])
 
 
 def _edges(rings: Iterable[Ring]) -> NDArray[np.float64]:

@@ -16,7 +16,10 @@ from .geometry import point_segment
 from .state import L
 
 # header of a block: corner of the grid N, E [m]; side of a cell [m]; rows (north), columns (east)
-CORNER_N, CORNER_E, SIDE, ROWS, COLUMNS, CELLS = 0, 1, 2, 3, 4, 5
+# and, for what looks far around, the uncut edges in runs of RUN, each behind the box (south, west, north, east) around it:
+# where they begin in the block, how many runs
+CORNER_N, CORNER_E, SIDE, ROWS, COLUMNS, EDGES, RUNS, CELLS = 0, 1, 2, 3, 4, 5, 6, 7
+RUN = 8
 # four numbers per cell from CELLS on, and one more cell as the end of the last; places of pieces count from the block
 FIRST, NEAREST, CLEARANCE, ON_LAND, CELL = 0, 1, 2, 3, 4
 PIECE = 4  #: numbers of a piece: N, E of its ends
@@ -149,10 +152,6 @@ def ray_range(land, h, n, e, dn, de, reach):
         pn, pe = n + t * dn, e + t * de
         row, column = _index(land, h, 0, pn), _index(land, h, 1, pe)
         c = _cell(land, h, row, column)
-        free = land[c + CLEARANCE]
-        if free > 0.0:
-            t += free + _NUDGE
-            continue
         nearest = math.inf
         for i in range(h + int(land[c + FIRST]), h + int(land[c + CELL + FIRST]), PIECE):
             an, ae = land[i] - n, land[i + 1] - e
@@ -165,13 +164,13 @@ def ray_range(land, h, n, e, dn, de, reach):
                     nearest = min(nearest, hit)
         if nearest < math.inf:
             return min(nearest, reach)
-        # on to the next cell
+        # on to the next cell, or farther if nothing is near
         tn = te = math.inf
         if dn != 0.0:
             tn = (low_n + side * (row + (1 if dn > 0.0 else 0)) - n) / dn
         if de != 0.0:
             te = (low_e + side * (column + (1 if de > 0.0 else 0)) - e) / de
-        t = max(min(tn, te), t) + _NUDGE
+        t = max(min(tn, te), t + land[c + CLEARANCE]) + _NUDGE
     return reach
 
 
@@ -212,18 +211,15 @@ def nearest_land(land, h, n, e, reach, out):
         out[i, 0] = out[i, 1] = math.nan
     if clearance(land, h, n, e) > reach:
         return
-    side = land[h + SIDE]
-    corner = land[h + CORNER_N]
     reach2 = reach * reach
-    for row in range(_index(land, h, 0, n - reach), _index(land, h, 0, n + reach) + 1):
-        # columns of the disc's chord in this row
-        off = max(corner + row * side - n, n - corner - (row + 1) * side, 0.0)
-        if off > reach:
+    begin, size = h + int(land[h + EDGES]), 4 + RUN * PIECE
+    for run in range(begin, begin + size * int(land[h + RUNS]), size):
+        dn, de = max(land[run] - n, n - land[run + 2], 0.0), max(land[run + 1] - e, e - land[run + 3], 0.0)
+        if dn * dn + de * de > reach2:
             continue
-        chord = math.sqrt(reach2 - off * off)
-        first, last = _index(land, h, 1, e - chord), _index(land, h, 1, e + chord)
-        end = h + int(land[_cell(land, h, row, last) + CELL + FIRST])
-        for k in range(h + int(land[_cell(land, h, row, first) + FIRST]), end, PIECE):
+        for k in range(run + 4, run + size, PIECE):
+            if point_segment(n, e, land[k], land[k + 1], land[k + 2], land[k + 3]) > reach:
+                continue
             an, ae, bn, be = land[k] - n, land[k + 1] - e, land[k + 2] - n, land[k + 3] - e
             turn = an * be - ae * bn  # > 0: a to b is clockwise
             if turn < 0.0:

@@ -384,6 +384,7 @@ def _picture(O: int, S: int) -> Dtype:
         # nearest land per bearing sector, N, E [m] {n}, NaN for none: as radar and LiDAR echo it, and as the chart has it
         # around the measured own position
         ("land", f8, (O, L, 2)), ("land_sensors", i1, (O, L)), ("chart", f8, (O, L, 2)),
+        ("chart_place", f8, (O, 2)),  # where the chart was last read [m] {n}
     ], align=True)  # fmt: skip
 
 
