@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -216,6 +217,53 @@ def test_ros1_survives_its_controller_and_its_master(ros1, tmp_path):
     assert times == sorted(times)
     assert any("master was away 1" in line for line in said.lines)
     assert "episode.usv" in said.lines[-1]  # Ctrl-C loses nothing
+
+
+@pytest.mark.slow
+def test_rviz_shows_the_markers(ros1, tmp_path):
+    """Under a virtual display: obstacles, ships, detections, track and thrust are on the screen."""
+    from PIL import Image
+
+    tools = [shutil.which(name) for name in ("rviz", "Xvfb", "import")]
+    if None in tools:
+        pytest.skip("needs rviz, xvfb and imagemagick")
+    display = f":{60 + os.getpid() % 30}"
+    settings = {
+        **ros1,
+        "DISPLAY": display,
+        "LIBGL_ALWAYS_SOFTWARE": "1",
+        "QT_X11_NO_MITSHM": "1",
+        "XDG_RUNTIME_DIR": str(tmp_path),
+    }
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    processes = [
+        spawn(tools[1], display, "-screen", "0", "1280x900x24", "+extension", "GLX", "-nolisten", "tcp", **quiet)
+    ]
+    try:
+        time.sleep(2.0)
+        processes.append(spawn(tools[0], "-d", ROOT / "ros" / "rviz" / "usv.rviz", env=settings, **quiet))
+        processes.append(bridge(sys.executable, ros1, tmp_path / "out", "--backend", "ros1", "--profile", "hilsim"))
+        control = {**ros1, "PYTHONPATH": ros1["CONTROL_PATH"]}
+        processes.append(spawn("/usr/bin/python3", EXAMPLES / "ros1_controller.py", "--route", *ROUTE, env=control))
+        time.sleep(30.0)
+        subprocess.run(
+            [tools[2], "-display", display, "-window", "root", tmp_path / "shot.png"], check=True, timeout=30
+        )
+    finally:
+        for process in reversed(processes):
+            end(process)
+        processes[2].stdout.close()
+    pixels = np.asarray(Image.open(tmp_path / "shot.png").convert("RGB"))[70:860, 370:].reshape(-1, 3).astype(int)
+    painted = {
+        "obstacles": ((166, 204, 230), 2000),
+        "ship": ((217, 77, 64), 300),
+        "track": ((242, 217, 51), 100),
+        "detections": ((37, 128, 80), 2000),
+        "thrust": ((255, 128, 0), 20),
+    }
+    for what, (colour, least) in painted.items():
+        count = np.count_nonzero(np.abs(pixels - colour).max(axis=1) < 30)
+        assert count > least, (what, count)
 
 
 # --- ROS 2 -----------------------------------------------------------------------------------------------------------
