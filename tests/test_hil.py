@@ -100,6 +100,14 @@ def test_answers_to_another_step_are_refused():
     np.testing.assert_array_equal(bridge.voyage.finish().actions, [expected(step) for step in range(1, 21)])
 
 
+def test_in_real_time_a_late_answer_is_taken():
+    bridge, wire, _ = memory_bridge(duration=1.0, answer=False, lock_step=False)
+    wire.send("cmd/actuators", actuators(7, Stamp(5)))
+    report = bridge.run()
+    assert "answers another step" not in report.rejected
+    np.testing.assert_array_equal(bridge.voyage.finish().actions[0], expected(7))
+
+
 @pytest.mark.parametrize(("control", "topic"), [("actuators", "cmd/actuators"), ("heading_speed", "cmd/heading_speed")])
 def test_trouble_on_the_way_is_deterministic(control, topic):
     def fly():

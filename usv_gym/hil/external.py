@@ -61,6 +61,7 @@ class ExternalController:
         if lock_step and not link.required:
             raise ConfigError(f"profile has no incoming row for {link.control!r}: nothing to wait for in lock-step")
         self.link, self.lock_step, self.timeout, self.fail_safe = link, lock_step, timeout, fail_safe
+        link.strict = lock_step  # in real time a late answer is better than none
         self.patience, self.interval, self.must_answer = patience, interval, must_answer
         self.task = TaskConfig(action=ACTIONS[link.control])  # type: ignore[arg-type]
         self.failsafe = False

@@ -103,7 +103,8 @@ class Link:
         self.counters: Counter[str] = Counter()
         self.sent: Counter[str] = Counter()
         self.received: Counter[str] = Counter()
-        self.expected: tuple[Any, ...] = ()  # stamp and number of the step that waits: what an answer may bear
+        self.strict = True  #: an answer has to bear the step that waits, or none; a lock-step wants that
+        self.expected: tuple[Any, ...] = ()  # stamp and number of the step that waits
         self._lock = threading.Lock()
         self._seed = seed
         self._random = np.random.default_rng([seed, 0x48494C])
@@ -160,7 +161,8 @@ class Link:
         last: list[tuple[_Out, list[Values]]] = []
         if status is not None:
             new["step"] = [status]
-            self.expected = (common["stamp"], self.step_count, 0, "")
+            if self.strict:
+                self.expected = (common["stamp"], self.step_count, 0, "")
         for out in self.out:
             name = out.row.signal
             if name not in new:
