@@ -138,3 +138,20 @@ def test_bad_actions_move_nothing():
         with pytest.raises(ValueError, match="action"):
             env.step(actions)
         assert env.worlds.tobytes() == before
+
+
+def test_kinematic_ships_are_agents_by_heading_and_speed():
+    """A ship without forces turns to where it is told and takes the speed it is told, beside a boat with jets."""
+    env = traffic_v0.parallel_env(agents=3, vessels=("odin", "ship"), icebergs=0)
+    env.reset(seed=3)
+    start = env.worlds["vessels"]["eta"][0, :3, 2].copy()
+    assert list(env.worlds["vessels"]["plant"][0, :3] >= 0) == [True, False, True]
+    to_starboard = np.array([0.5, 0.0], np.float32)  # 45 deg off the measured heading, half speed, at each step
+    for _ in range(20):
+        _, rewards, *_ = env.step(dict.fromkeys(env.agents, to_starboard))
+        assert all(np.isfinite(reward) for reward in rewards.values())
+    v = env.worlds["vessels"]
+    assert (v["eta"][0, :3, 2] - start > np.radians(8.0)).all()
+    assert v["nu"][0, 1, 0] == pytest.approx(0.5 * env._models[1].max_speed, rel=0.1)
+    nav = env.worlds["nav"]["position"][0, 1]
+    assert np.hypot(*(nav - v["eta"][0, 1, :2])) < 1.0  # measured where it is, not where the last frame left it

@@ -51,8 +51,9 @@ def tick_world(w, land, tracks, rows, row):
     if tick - w.frame_tick >= w.frame_ticks:
         end_frame(w, land, tracks)
     if tick >= w.next_nav:
-        if w.vessels.model[w.observer[0]] != MODEL_3DOF:
-            move_traffic(w, tick)  # a kinematic observer is where the traffic is
+        for o in range(w.observer.shape[0]):
+            if w.vessels.model[w.observer[o]] != MODEL_3DOF:
+                move_traffic(w, tick)  # a kinematic observer is where the traffic is
         navigate(w, tick)
     if tick >= w.next_sense:
         move_traffic(w, tick)
