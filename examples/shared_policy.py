@@ -14,6 +14,7 @@ from typing import Any
 
 import supersuit
 from stable_baselines3 import PPO
+from stable_baselines3.common.utils import set_random_seed
 
 from usv_gym import traffic_v0
 
@@ -31,8 +32,9 @@ def vector_env(seas: int = 4, **kwargs: Any) -> Any:
 def train(steps: int, seas: int = 4, **kwargs: Any) -> Any:
     """The trained model; ``kwargs`` go to the environment."""
     ships = {"agents": 4, "vessels": ("odin", "otter", "ship"), "observation": "truth", **kwargs}
-    model = PPO("MlpPolicy", vector_env(seas, **ships), n_steps=128, batch_size=512, device="cpu", seed=1, verbose=0)
-    return model.learn(steps, progress_bar=False)
+    set_random_seed(1)  # of the learner; SuperSuit's vector environment cannot be seeded after it is made
+    model = PPO("MlpPolicy", vector_env(seas, **ships), n_steps=128, batch_size=512, device="cpu")
+    return model.learn(steps)
 
 
 def main() -> None:

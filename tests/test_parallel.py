@@ -152,6 +152,7 @@ def test_kinematic_ships_are_agents_by_heading_and_speed():
         assert all(np.isfinite(reward) for reward in rewards.values())
     v = env.worlds["vessels"]
     assert (v["eta"][0, :3, 2] - start > np.radians(8.0)).all()
-    assert v["nu"][0, 1, 0] == pytest.approx(0.5 * env._models[1].max_speed, rel=0.1)
+    ship = env._models[1]
+    assert 0.5 * ship.max_speed < v["nu"][0, 1, 0] < 0.95 * ship.cruise_speed  # slowly, as a ship does
     nav = env.worlds["nav"]["position"][0, 1]
     assert np.hypot(*(nav - v["eta"][0, 1, :2])) < 1.0  # measured where it is, not where the last frame left it

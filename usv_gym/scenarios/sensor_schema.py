@@ -198,7 +198,7 @@ class Tdm(Model):
     filter: Literal["thesis", "light"] = Field(
         default="thesis", description="local filters: those of the thesis, or six states at a constant velocity"
     )
-    light_q: Positive = Field(default=0.003, description="driving noise of `light`: density [(m/s2)^2/s]")
+    light_q: Positive = Field(default=1e-4, description="driving noise of `light`: density [(m/s2)^2/s]")
     timeout_factor: Annotated[float, Field(strict=True, ge=1)] = Field(
         default=2.5, description="a sensor is dropped after this many of its expected intervals"
     )
