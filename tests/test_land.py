@@ -331,5 +331,5 @@ def test_the_part_land_comes_with_land_or_when_asked_for():
     assert make([corners(300, 0, 50, 400)], env={"land": False}).observation_space.shape == (12 + 8 * 9,)
     env = gym.make("usv_gym/OpenSea-v0", land=True, land_sectors=24, flat=False)
     observation, _ = env.reset(seed=0)
-    assert observation["land"].shape == (2, 24)
+    assert observation["land"].shape == observation["chart"].shape == (24,)
     assert not observation["land"].any()

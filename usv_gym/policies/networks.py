@@ -23,8 +23,9 @@ class TargetEncoder(BaseFeaturesExtractor):
 
     def __init__(self, space: gym.Space[Any], width: int, range_scale: float, targets: int) -> None:
         self.targets = N_OWN + targets * N_TARGET  # where they end
-        land = gym.spaces.flatdim(space["land"]) if isinstance(space, gym.spaces.Dict) and "land" in space.spaces else 0
-        if not isinstance(space, gym.spaces.Dict):
+        if isinstance(space, gym.spaces.Dict):
+            land = sum(gym.spaces.flatdim(space[name]) for name in ("land", "chart") if name in space.spaces)
+        else:
             land = gym.spaces.flatdim(space) - self.targets
         super().__init__(space, N_OWN + width + land)
         self.range_scale = range_scale
@@ -36,7 +37,7 @@ class TargetEncoder(BaseFeaturesExtractor):
         """Features [B, N_OWN + width + sectors of land] of flat or Dict observations."""
         if isinstance(observations, dict):
             own, targets = observations["own"], observations["targets"]
-            land = [observations["land"].flatten(1)] if "land" in observations else []
+            land = [observations[name] for name in ("land", "chart") if name in observations]
         else:
             own, land = observations[:, :N_OWN], [observations[:, self.targets :]]
             targets = observations[:, N_OWN : self.targets].unflatten(1, (-1, N_TARGET))

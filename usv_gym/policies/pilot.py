@@ -224,7 +224,7 @@ class Pilot:
     def act(self, observation: Any) -> NDArray[np.float32]:
         """The action for one observation: flat, or its Dict form."""
         if isinstance(observation, Mapping):
-            parts = [np.ravel(observation[name]) for name in ("own", "targets", "land") if name in observation]
+            parts = [np.ravel(observation[name]) for name in ("own", "targets", "land", "chart") if name in observation]
             observation = np.concatenate(parts)
         action: NDArray[np.float32] = self.act_batch(np.asarray(observation, np.float32)[None])[0].copy()
         return action

@@ -260,7 +260,8 @@ def observation_space(config: TaskConfig) -> gym.Space[Any]:
         spaces["targets"] = gym.spaces.Box(least, most, dtype=np.float32)
         spaces["mask"] = gym.spaces.MultiBinary(config.targets)
     if config.land:
-        spaces["land"] = gym.spaces.Box(0.0, 1.0, (2, config.land_sectors), np.float32)
+        for name in ("land", "chart"):
+            spaces[name] = gym.spaces.Box(0.0, 1.0, (config.land_sectors,), np.float32)
     return gym.spaces.Dict(spaces)
 
 
@@ -275,5 +276,6 @@ def unflatten(config: TaskConfig, flat: NDArray[np.float32]) -> dict[str, NDArra
         targets = rest.reshape(*rest.shape[:-1], config.targets, N_TARGET).copy()
         parts |= {"targets": targets, "mask": targets[..., 0].astype(np.int8)}
     if config.land:
-        parts["land"] = flat[..., start:].reshape(*flat.shape[:-1], 2, config.land_sectors).copy()
+        end = start + config.land_sectors
+        parts |= {"land": flat[..., start:end].copy(), "chart": flat[..., end:].copy()}
     return parts
