@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 def compare_campaigns(old: Path, new: Path, *, alpha: float = 0.05, tolerance: float = 0.01) -> dict[str, Any]:
     """Compare the policies that both have; if each has one only, those two, whatever they are called.
 
-    A policy is worse if more of its episodes failed, if a McNemar test (collision, near miss, success) says so, or if a mean
-    score is lower by more than ``tolerance`` and its Wilcoxon test says so; ``alpha`` is for all tests of a policy together
-    (Holm 1979).
+    A policy is worse if more of its episodes failed, if a McNemar test (collision, grounding, near miss, success) says so, or
+    if a mean score is lower by more than ``tolerance`` and its Wilcoxon test says so; ``alpha`` is for all tests of a policy
+    together (Holm 1979).
 
     Raises
     ------

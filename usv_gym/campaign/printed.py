@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 @contextmanager
 def progress_bar(console: Console) -> Iterator[Progress]:
     """A bar that counts episodes, collisions and failures; without a terminal, a line every tenth."""
-    counts = {"collision": 0, FAILED: 0}
+    counts = {"collision": 0, "grounding": 0, FAILED: 0}
 
     def count(result: Result | None) -> str:
         if result is not None and result.outcome in counts:
             counts[result.outcome] += 1
-        return f"collisions {counts['collision']}  failed {counts[FAILED]}"
+        aground = f"groundings {counts['grounding']}  " if counts["grounding"] else ""
+        return f"collisions {counts['collision']}  {aground}failed {counts[FAILED]}"
 
     if console.is_terminal:
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn

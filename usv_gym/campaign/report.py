@@ -16,7 +16,7 @@ from ..scenarios.suites import Case
 from .figures import NAMES, RULES, bearing_rose, clearance_histogram, score_boxes, speed_map, track_plot
 from .flight import FAILED, Flight
 from .runner import Fleet
-from .summary import CLASSES, SCORES, claim, share
+from .summary import CLASSES, CONTACTS, SCORES, claim, share
 
 Row = Mapping[str, Any]
 
@@ -31,7 +31,7 @@ def badness(row: Row) -> tuple[float, ...]:
     known = [score for score in scores if score is not None]
     closest = 1e9 if row["closest"] is None else float(row["closest"])
     safety = row.get("safety_min")
-    return (row["outcome"] != "collision", not row.get("near_miss"), 1.0 if safety is None else safety,
+    return (row["outcome"] not in CONTACTS, not row.get("near_miss"), 1.0 if safety is None else safety,
             min(known, default=1.0), closest)  # fmt: skip
 
 
@@ -169,7 +169,7 @@ def _verdict(meta: Mapping[str, Any], rows: Sequence[Row], summary: Mapping[str,
         failed = f" {one['failed']['k']:,} episodes failed: see below." if one["failed"]["k"] else ""
         lines.append(f"<div class=verdict>{badge}<span><b>{_e(name)}</b>: {_e(claim(one))}.{failed}</span></div>")
     asked = summary["accept"]
-    wanted = (f"Accepted is a collision probability below {share(asked)}. " if asked is not None else "")  # fmt: skip
+    wanted = "" if asked is None else f"Accepted is a probability of a collision or grounding below {share(asked)}. "
     seeds = meta["seeds"]
     span = f"{seeds[0]} to {seeds[-1]}" if len(seeds) > 1 else str(seeds[0])
     mix = "this one case" if len(meta["cases"]) == 1 else f"this mix of {len(meta['cases'])} cases"
@@ -200,12 +200,13 @@ def _table(heads: Iterable[str], lines: Iterable[str], caption: str = "") -> str
 
 def _policy_table(policies: Mapping[str, Any]) -> str:
     lines = []
+    aground = ["grounding"] if any(one["grounding"]["k"] for one in policies.values()) else []
     for name, one in policies.items():
-        cells = _rate(one["collision"]) + _rate(one["near_miss"]) + _rate(one["success"], hit=False)
+        cells = "".join(_rate(one[event]) for event in ("collision", *aground, "near_miss")) + _rate(one["success"], hit=False)
         cells += "".join(_level(one[score]) for score in SCORES)
         cells += _level(one["extra_time"], 0) + _level(one["rudder_activity"], 3)
         lines.append(f"<tr><td><b>{_e(name)}</b></td>{cells}</tr>")
-    heads = ["policy", "collision", "near miss", "success", *RULES.values(), "extra time [s]", "rudder activity"]
+    heads = ["policy", "collision", *aground, "near miss", "success", *RULES.values(), "extra time [s]", "rudder activity"]
     return "<h2>Policies</h2><div class=card>" + _table(heads, lines) + (
         "<p class=soft><small>Rates with exact 95 % intervals, means with bootstrap 95 % intervals. Scores after Hagen et al. "
         "2023, 1 is best, of encounters whose closest point was passed; Rules 9, 10, 18 and 19 are not judged."
@@ -219,7 +220,8 @@ def _paired(pairs: Sequence[Mapping[str, Any]]) -> str:
     lines = []
     for pair in pairs:
         cells = "".join(
-            f"<td>{e['only_old']} : {e['only_new']}<small>p = {e['p']:.2g}</small></td>" for e in pair["events"].values()
+            f"<td>{e['only_old']} : {e['only_new']}<small>p = {e['p']:.2g}</small></td>"
+            for e in (pair["events"][name] for name in ("collision", "near_miss", "success"))
         )
         for name in ("safety", "r8", "extra_time"):
             s = pair["numbers"].get(name)
@@ -237,9 +239,11 @@ def _paired(pairs: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _worst(meta: Mapping[str, Any], row: Row, film: Mapping[str, Any]) -> str:
-    contact = row["outcome"] == "collision"
+    contact = row["outcome"] in CONTACTS
     closest = "nothing near" if row["closest"] is None else f"{row['closest']:.1f} m from {row['closest_to']}"
-    what = f"<b class=bad>collision with {_e(row['closest_to'])}</b>" if contact else f"<b>{_e(closest)}</b>"
+    what = f"<b>{_e(closest)}</b>"
+    if contact:
+        what = f"<b class=bad>{'aground' if row['outcome'] == 'grounding' else 'collision with ' + _e(row['closest_to'])}</b>"
     reasons = [e for e in row["encounters"] if e["complete"] or e["contact"]]
     reasons.sort(key=lambda e: min((e[s] for s in SCORES if e[s] is not None), default=1.0))
     why = "".join(f"<p>{_e(NAMES.get(e['class'], e['class']))}: {_e(e['why'])}</p>" for e in reasons[:1])
@@ -308,7 +312,7 @@ def _case_table(summary: Mapping[str, Any]) -> str:
             kind = "hit" if rate["k"] else "zero"
             cells += f"<td class={kind}>{rate['k']:,} <span class=soft>of {rate['n']:,}</span></td>"
         lines.append(f"<tr><td>{_e(case)}</td>{cells}</tr>")
-    return f"<h2>Collisions by case</h2><div class=card>{_table(['case', *names], lines)}</div>"
+    return f"<h2>Collisions and groundings by case</h2><div class=card>{_table(['case', *names], lines)}</div>"
 
 
 def _provenance(meta: Mapping[str, Any], summary: Mapping[str, Any]) -> str:

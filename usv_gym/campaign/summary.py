@@ -17,15 +17,18 @@ Row = Mapping[str, Any]
 CONFIDENCE = 0.95
 SCORES = ("safety", "r8", "r13", "r14", "r15", "r16", "r17")
 CLASSES = ("head_on", "crossing_give_way", "crossing_stand_on", "overtaking", "overtaken")
+CONTACTS = ("collision", "grounding")  #: outcomes that a verdict is about
 #: yes-or-no results of an episode
 EVENTS: Mapping[str, Any] = {
     "collision": lambda row: row["outcome"] == "collision",
+    "grounding": lambda row: row["outcome"] == "grounding",
+    "contact": lambda row: row["outcome"] in CONTACTS,
     "near_miss": lambda row: bool(row.get("near_miss")),
     "success": lambda row: row["outcome"] == "arrival",
     "failed": lambda row: row["outcome"] == FAILED,
 }
 #: better when it is smaller (-1) or larger (1)
-BETTER = {"collision": -1, "near_miss": -1, "success": 1, "failed": -1, "extra_time": -1, "extra_distance": -1,
+BETTER = {"collision": -1, "grounding": -1, "near_miss": -1, "success": 1, "failed": -1, "extra_time": -1, "extra_distance": -1,
           "rudder_activity": -1, "throttle_activity": -1, **dict.fromkeys(SCORES, 1)}  # fmt: skip
 NUMBERS = (*SCORES, "extra_time", "extra_distance", "rudder_activity")
 
@@ -96,7 +99,8 @@ def paired(old: Sequence[Row], new: Sequence[Row]) -> dict[str, Any]:
     out: dict[str, Any] = {"pairs": len(pairs), "events": {}, "numbers": {}}
     if not pairs:
         return out
-    for name in ("collision", "near_miss", "success"):
+    aground = any(map(EVENTS["grounding"], a + b))
+    for name in ("collision", *(["grounding"] if aground else []), "near_miss", "success"):
         test = EVENTS[name]
         d = mcnemar([test(row) for row in a], [test(row) for row in b])
         out["events"][name] = {"old": d.both + d.only_a, "new": d.both + d.only_b, "only_old": d.only_a, "only_new": d.only_b,
@@ -111,8 +115,8 @@ def paired(old: Sequence[Row], new: Sequence[Row]) -> dict[str, Any]:
 def summarise(meta: Mapping[str, Any], rows: Sequence[Row], accept: float | None = None) -> dict[str, Any]:
     """Everything that the report says in numbers.
 
-    ``accept`` is the largest probability of a collision that is acceptable; the verdict on a policy is then ``pass`` if the
-    probability is below it at 95 %, ``fail`` if it is above, else ``open``.
+    ``accept`` is the largest probability of a collision or grounding that is acceptable; the verdict on a policy is then
+    ``pass`` if the probability is below it at 95 %, ``fail`` if it is above, else ``open``.
     """
     by_policy = {name: [row for row in rows if row["policy"] == name] for name in meta["policies"]}
     by_policy = {name: own for name, own in by_policy.items() if own}
@@ -122,12 +126,15 @@ def summarise(meta: Mapping[str, Any], rows: Sequence[Row], accept: float | None
         one["verdict"] = verdict(one, accept)
     return {
         "suite": meta["suite"], "accept": accept, "confidence": CONFIDENCE, "policies": policies,
-        "cases": {case: {name: rate(sum(row["outcome"] == "collision" for row in own if row["case"] == case),
-                                    sum(row["outcome"] != FAILED for row in own if row["case"] == case))
-                         for name, own in by_policy.items()} for case in meta["cases"]},
+        "cases": {case: {name: _contacts([row for row in own if row["case"] == case]) for name, own in by_policy.items()}
+                  for case in meta["cases"]},
         "paired": [{"old": a, "new": b, **paired(by_policy[a], by_policy[b])}
                    for i, a in enumerate(names) for b in names[i + 1 :]],
     }  # fmt: skip
+
+
+def _contacts(rows: Sequence[Row]) -> dict[str, Any]:
+    return rate(sum(row["outcome"] in CONTACTS for row in rows), sum(row["outcome"] != FAILED for row in rows))
 
 
 def verdict(policy: Mapping[str, Any], accept: float | None) -> str:
@@ -136,25 +143,30 @@ def verdict(policy: Mapping[str, Any], accept: float | None) -> str:
         return "fail"
     if accept is None:
         return "none"
-    collision = policy["collision"]
-    if collision["n"] == 0:
+    contact = policy["contact"]
+    if contact["n"] == 0:
         return "open"
-    if collision["below"] < accept:
+    if contact["below"] < accept:
         return "pass"
-    low = clopper_pearson(collision["k"], collision["n"], 2 * CONFIDENCE - 1)[0]
+    low = clopper_pearson(contact["k"], contact["n"], 2 * CONFIDENCE - 1)[0]
     return "fail" if low > accept else "open"
 
 
 def claim(policy: Mapping[str, Any]) -> str:
-    """What the collisions of a policy prove, in one sentence."""
-    c = policy["collision"]
+    """What the collisions and groundings of a policy prove, in one sentence."""
+    c = policy["contact"]
     if not c["n"]:
         return "no episode was flown to its end"
-    word = "collision" if c["k"] == 1 else "collisions"
-    found = f"{c['k']:,} {word} in {c['n']:,} {'episode' if c['n'] == 1 else 'episodes'}"
+
+    def count(name: str) -> str:
+        return f"{policy[name]['k']:,} {name}{'' if policy[name]['k'] == 1 else 's'}"
+
+    aground = f" and {count('grounding')}" if policy["grounding"]["k"] else ""
+    found = f"{count('collision')}{aground} in {c['n']:,} {'episode' if c['n'] == 1 else 'episodes'}"
+    what = "probability of either" if aground else "collision probability"
     if c["rate"] > 0.1:  # nothing that anyone would want to claim
-        return f"{found}: the collision probability is {100 * c['low']:.0f} to {100 * c['high']:.0f} % (95 %)"
-    return f"{found}: the collision probability is below {share(c['below'])} at 95 %"
+        return f"{found}: the {what} is {100 * c['low']:.0f} to {100 * c['high']:.0f} % (95 %)"
+    return f"{found}: the {what} is below {share(c['below'])} at 95 %"
 
 
 def share(x: float) -> str:

@@ -23,7 +23,7 @@ def evaluate(
         Path | None, typer.Option(help="directory of the results; what is there already is not flown again. Default runs/SUITE")
     ] = None,
     accept: Annotated[
-        float | None, typer.Option(help="largest acceptable probability of a collision, as 0.003; exit code 1 if not proven")
+        float | None, typer.Option(help="acceptable probability of a collision or grounding, as 0.003; else exit code 1")
     ] = None,
     only: Annotated[
         list[str] | None, typer.Option(metavar="CASE[:SEED]", help="fly only this; may be given several times")
