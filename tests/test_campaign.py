@@ -295,6 +295,15 @@ def test_more_seeds_and_policies_add_to_what_is_there_and_other_things_are_refus
         go(plan_campaign("octagon", ["idle"], seeds=1))
 
 
+def test_only_one_episode_of_a_suite_is_flown_when_only_that_is_asked_for(tmp_path):
+    whole = plan_campaign("imazu", ["avoid"], seeds=3)
+    assert sum(len(flight.seeds) for flight in whole.flights(set())) == 66
+    (one,) = plan_campaign("imazu", ["avoid"], only=["imazu/03:7"]).flights(set())
+    assert (one.case.id, one.seeds) == ("imazu/03", (7,))
+    (case,) = plan_campaign("imazu", ["avoid"], seeds=3, only=["imazu/03"]).flights(set())
+    assert case.seeds == (0, 1, 2)
+
+
 def test_the_gate_lets_the_same_pass_and_stops_a_worse_one(undisturbed, tmp_path):
     out, _ = undisturbed
     for name in ("avoid", "waypoints"):

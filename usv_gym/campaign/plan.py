@@ -45,6 +45,7 @@ class Campaign:
     step_limit: float = 2.0
     profile: str = "scaled"  #: of the judge's parameters
     only: frozenset[tuple[str, int | None]] = field(default_factory=frozenset)  #: (case, seed or None): fly no other
+    source: str = ""  #: what the suite was called by: its name or path
 
     def wanted(self, case: str, seed: int) -> bool:
         """Whether an episode is to be flown."""
@@ -118,7 +119,8 @@ def plan_campaign(
     numbers = tuple(range(first, first + number))
     if chosen and all(seed is not None for _, seed in chosen):
         numbers = tuple(dict.fromkeys(more))
-    return Campaign(found.name, found.description, cases, tuple(policies), numbers, vessel, trust, step_limit, profile, chosen)
+    return Campaign(found.name, found.description, cases, tuple(policies), numbers, vessel, trust, step_limit, profile, chosen,
+                    suite)  # fmt: skip
 
 
 def replace_case(case: Case, overrides: Sequence[str]) -> Case:
@@ -254,7 +256,8 @@ def _meta(campaign: Campaign, identity: Mapping[str, Any], before: Mapping[str, 
     policies = [*(before["policies"] if before else []), *campaign.policies]
     seeds = sorted({*(before["seeds"] if before else []), *campaign.seeds})
     return {
-        "format": FORMAT, "version": VERSION, "suite": campaign.suite, "description": campaign.description,
+        "format": FORMAT, "version": VERSION, "suite": campaign.suite, "source": campaign.source,
+        "description": campaign.description,
         "policies": list(dict.fromkeys(policies)), "seeds": seeds,
         "cases": {**(before["cases"] if before else {}), **cases}, "vessel": campaign.vessel,
         "step_limit": campaign.step_limit, "profile": campaign.profile, "trust": campaign.trust,

@@ -62,7 +62,7 @@ def command_of(meta: Mapping[str, Any], row: Row, suite: str | None = None) -> s
         more.append(f"family.difficulty={case['difficulty']!r}")
     words = ["usv-gym", "run", str(scenario), "--policy", row["policy"], "--seed", str(row["seed"])]
     if not isinstance(scenario, str):
-        words = ["usv-gym", "evaluate", "--suite", meta["suite"], "--policy", row["policy"],
+        words = ["usv-gym", "evaluate", "--suite", meta["source"], "--policy", row["policy"],
                  "--only", f"{row['case']}:{row['seed']}", "--out", "again"]  # fmt: skip
         more = []
     if meta["vessel"]:

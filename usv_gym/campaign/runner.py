@@ -85,7 +85,7 @@ class Fleet:
     """
 
     def __init__(self, workers: int | None = None) -> None:
-        self.size = len(os.sched_getaffinity(0)) if workers is None else workers
+        self.size = (os.cpu_count() or 1) if workers is None else workers
         self._context = multiprocessing.get_context("spawn")
         self._workers: list[_Worker] = []
         self._yard = Yard()
