@@ -61,7 +61,7 @@ def print_summary(summary: Mapping[str, Any], console: Console) -> None:
         if len(one["causes"]) > 5:
             console.print(f"  and {len(one['causes']) - 5} other causes: summary.json has them", highlight=False)
     table = Table(box=None, pad_edge=False)
-    heads = ("policy", "episodes", "collision (95 %)", "near miss", "success (95 %)", *(s.removeprefix("r") for s in SCORES))
+    heads = ("policy", "episodes", "collision (95 %)", "near miss", "success (95 %)", *SCORES)
     for heading in heads:
         table.add_column(heading, justify="left" if heading == "policy" else "right", no_wrap=heading == "policy")
     for name, one in summary["policies"].items():
@@ -75,5 +75,5 @@ def interval(rate: Mapping[str, Any], both: bool = True) -> str:
     """``1.2 % (0.8 to 1.7)``."""
     if not rate["n"]:
         return "-"
-    text = f"{100 * rate['rate']:.2f} %"
-    return f"{text} ({100 * rate['low']:.2f} to {100 * rate['high']:.2f})" if both else text
+    share, low, high = (f"{100 * rate[key]:.3g}" for key in ("rate", "low", "high"))
+    return f"{share} % ({low} to {high})" if both else f"{share} %"

@@ -206,7 +206,7 @@ def _policy_table(policies: Mapping[str, Any]) -> str:
         cells += "".join(_level(one[score]) for score in SCORES)
         cells += _level(one["extra_time"], 0) + _level(one["rudder_activity"], 3)
         lines.append(f"<tr><td><b>{_e(name)}</b></td>{cells}</tr>")
-    heads = ["policy", "collision", *aground, "near miss", "success", *RULES.values(), "extra time [s]", "rudder activity"]
+    heads = ["policy", "collision", *aground, "near miss", "success", *RULES.values(), "extra time [s]", "rudder"]
     return "<h2>Policies</h2><div class=card>" + _table(heads, lines) + (
         "<p class=soft><small>Rates with exact 95 % intervals, means with bootstrap 95 % intervals. Scores after Hagen et al. "
         "2023, 1 is best, of encounters whose closest point was passed; Rules 9, 10, 18 and 19 are not judged."
