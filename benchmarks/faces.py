@@ -146,7 +146,7 @@ def peers(seconds: float) -> dict[str, dict[str, float] | None]:
         except (ImportError, gym.error.Error):
             result[name] = None
             continue
-        steps = 40 if module else 2000
+        steps = 10 if module else 2000
         result[name] = rounds(lambda env=env, steps=steps: _play(env, steps), seconds)  # type: ignore[misc]
         env.close()
     return result
