@@ -6,7 +6,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from measure import ACTION, WARM, rounds
+from measure import ACTION, WARM, rewinder, rounds
 from seas import crowded_sea
 
 import usv_gym  # noqa: F401
@@ -37,7 +37,7 @@ def one_world(seconds: float, **kwargs: Any) -> dict[str, float]:
             env.step(action)
         return 300
 
-    result = rounds(work, seconds)
+    result = rounds(work, seconds, rewinder(env.unwrapped.core))  # type: ignore[attr-defined]
     tracked = float(env.unwrapped.world["picture"]["count"][0])  # type: ignore[attr-defined]
     env.close()
     return {**result, "tracked": tracked}
@@ -57,7 +57,7 @@ def batch(seconds: float, worlds: int, threads: int = 1, **kwargs: Any) -> dict[
             env.step(actions)
         return steps * worlds
 
-    result = rounds(work, seconds)
+    result = rounds(work, seconds, rewinder(env.unwrapped.core))  # type: ignore[attr-defined]
     env.close()
     return result
 
@@ -78,9 +78,11 @@ def threads(seconds: float, worlds: int, crew: int, **kwargs: Any) -> float:
             env.step(actions)
         return steps * worlds
 
+    rewind = [rewinder(env.unwrapped.core) for env in envs]  # type: ignore[attr-defined]
     for _ in range(4):
         for k, env in enumerate(envs):
-            best[k] = max(best[k], rounds(lambda env=env: work(env), seconds / 8.0)["steps_per_s"])  # type: ignore[misc]
+            rate = rounds(lambda env=env: work(env), seconds / 8.0, rewind[k])["steps_per_s"]  # type: ignore[misc]
+            best[k] = max(best[k], rate)
     for env in envs:
         env.close()
     return best[1] / best[0]
@@ -100,14 +102,15 @@ def sb3(seconds: float, worlds: int, **kwargs: Any) -> dict[str, float] | None:
     actions = np.tile(np.array(ACTION, np.float32), (worlds, 1))
 
     def rate(env: VecEnv, steps: int) -> float:
+        given = actions[: env.num_envs]
         env.reset()
         for _ in range(5):
-            env.step(actions)
+            env.step(given)
 
         def work() -> int:
             for _ in range(steps):
-                env.step(actions)
-            return steps * worlds
+                env.step(given)
+            return steps * env.num_envs
 
         result = rounds(work, seconds)["steps_per_s"]
         env.close()
@@ -119,7 +122,7 @@ def sb3(seconds: float, worlds: int, **kwargs: Any) -> dict[str, float] | None:
     result = {
         "adapter": rate(make_vec_env(SCENARIO, worlds, **kwargs), 30),
         "dummy": rate(DummyVecEnv([make] * worlds), 5),
-        "subproc": rate(SubprocVecEnv([make] * min(worlds, 8), start_method="fork"), 20) * min(worlds, 8) / worlds,
+        "subproc": rate(SubprocVecEnv([make] * min(worlds, 8), start_method="fork"), 20),
         "vector": batch(seconds, worlds, **kwargs)["steps_per_s"],
     }
     env = make_vec_env(SCENARIO, worlds, **kwargs)
