@@ -34,7 +34,7 @@ def test_closest_points_of_imazu_13():
     scene = start("imazu/13", title="imazu_13")
     assert scene.panel.title == "imazu_13"
     assert [(row.encounter, round(row.cpa), round(row.tcpa)) for row in scene.panel.targets] == [
-        ("HO", 0, 180), ("SO", 0, 180), ("SO", 0, 180)]  # fmt: skip
+        ("head on", 0, 180), ("stand on", 0, 180), ("stand on", 0, 180)]  # fmt: skip
     assert texts(scene, "label_cpa") == ["CPA (3 ships) 0 m at 3:00"]  # one place, one text
     assert [circle.centre for circle in scene.all(Circle, "mark")] == [pytest.approx((0, 0), abs=1e-6)]
     assert texts(scene, "label_vessel") == [
