@@ -370,11 +370,15 @@ def clip(points: Points, frame: Frame) -> Points:
     shape = points
     for axis, bound, sign in ((0, x0, 1.0), (0, x1, -1.0), (1, y0, 1.0), (1, y1, -1.0)):
         # for each edge p -> q: where it crosses the bound, then q if that is inside
-        p, q = np.roll(shape, 1, axis=0), shape
-        dp, dq = sign * (p[:, axis] - bound), sign * (q[:, axis] - bound)
-        crosses, inside = (dp < 0.0) != (dq < 0.0), dq >= 0.0
+        dq = sign * (shape[:, axis] - bound)
+        inside = dq >= 0.0
+        if inside.all():
+            continue
+        before = np.arange(-1, len(shape) - 1)
+        p, dp = shape[before], dq[before]
+        crosses = inside[before] != inside
         share = np.divide(dp, dp - dq, out=np.zeros_like(dp), where=crosses)
-        both = np.stack((p + share[:, None] * (q - p), q), axis=1)
+        both = np.stack((p + share[:, None] * (shape - p), shape), axis=1)
         shape = both[np.column_stack((crosses, inside))]
         if not len(shape):
             return points[:0]
