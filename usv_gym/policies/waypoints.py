@@ -13,7 +13,7 @@ from .pilot import OWN, TARGET, Pilot, command, line_of_sight, look
 @kernel
 def _decide(obs, mask, ship, tuning, states, actions):
     own = np.zeros(1, OWN)[0]
-    targets = np.zeros(ship[0].targets, TARGET)
+    targets = np.zeros(ship[0].targets + ship[0].land, TARGET)
     for b in range(obs.shape[0]):
         if mask[b]:
             look(obs[b], ship[0], own, targets)
