@@ -156,3 +156,10 @@ def test_kinematic_ships_are_agents_by_heading_and_speed():
     assert 0.5 * ship.max_speed < v["nu"][0, 1, 0] < 0.95 * ship.cruise_speed  # slowly, as a ship does
     nav = env.worlds["nav"]["position"][0, 1]
     assert np.hypot(*(nav - v["eta"][0, 1, :2])) < 1.0  # measured where it is, not where the last frame left it
+
+
+@pytest.mark.parametrize("key", ["land", "family"])
+def test_what_the_traffic_environment_would_ignore_is_refused(key):
+    scenario = {"name": "mine", "land": {"polygons": [{"shell": [[900, 0], [900, 9], [990, 9]]}]}, "family": "near_shore"}
+    with pytest.raises(ConfigError, match=f"'mine': {key}: the traffic environment has none"):
+        traffic_v0.parallel_env(scenario={"name": "mine", key: scenario[key]})

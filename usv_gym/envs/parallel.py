@@ -97,6 +97,9 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self.render_mode = render_mode
         config = task_config({"action": "heading_speed", **task}, reward)
         self.scenario = load_scenario(TRAFFIC if scenario is None else scenario, overrides=overrides)
+        for key in ("land", "family"):
+            if getattr(self.scenario, key) is not None:
+                raise ConfigError(f"scenario {self.scenario.name!r}: {key}: the traffic environment has none; leave it out")
         self.icebergs = icebergs
         self.possible_agents = [f"ship_{k}" for k in range(agents)]
         self.agents: list[str] = []
