@@ -13,7 +13,7 @@ from usv_gym.envs.core import Core
 from usv_gym.policies import POLICIES, Controller, make_policy
 from usv_gym.policies.thrust_log import commands, per_tick, read_thrust_log
 from usv_gym.run import plan, run, shipped_log
-from usv_gym.tasks.task import OUTCOMES
+from usv_gym.tasks.task import N_OWN, N_TARGET, OUTCOMES, observation_size
 from usv_gym.voyage import task_of
 from usv_gym.world.vessel import load_vessel
 
@@ -113,6 +113,22 @@ def test_avoid_is_the_waypoint_follower_where_nothing_is_seen():
 @pytest.mark.parametrize("name", POLICIES)
 def test_every_policy_is_a_controller(name):
     assert isinstance(make_policy(name), Controller)
+
+
+@pytest.mark.parametrize("name", ["waypoints", "avoid", "vo", "sbmpc", "apf"])
+def test_every_lookout_has_room_for_all_targets_and_land_all_around(name):
+    pilot = make_policy(name)
+    config = pilot.task.model_copy(update={"land": True})
+    scales = {key: getattr(config, key) for key in ("range_scale", "distance_scale", "target_speed_scale", "radius_scale",
+                                                    "rate_scale")}  # fmt: skip
+    pilot.reset_batch(1, {"scales": {**scales, "max_speed": 5.0, "cruise_speed": 4.0, "length": 10.0, "control_interval": 1.0,
+                                     "targets": config.targets, "land": config.land_sectors}})  # fmt: skip
+    seen = np.full((1, observation_size(config)), 0.1, np.float32)
+    seen[0, N_OWN : N_OWN + config.targets * N_TARGET : N_TARGET] = 1.0  # every target is there
+    seen[0, N_OWN + config.targets * N_TARGET :] = 0.99  # and land at 37 m on every side
+    assert np.isfinite(pilot.act_batch(seen)).all()
+    assert len(pilot._targets) == config.targets + config.land_sectors
+    assert (pilot._targets["distance"] > 0.0).all()
 
 
 def test_an_unknown_policy_gets_a_suggestion():

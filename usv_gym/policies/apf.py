@@ -10,14 +10,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from ..jit import kernel
 from ..trig import atan2, clip, sincos, wrap
 from ..world.encounter import CROSSING_GIVE_WAY, CROSSING_STAND_ON, HEAD_ON, OVERTAKEN
-from .pilot import OWN, TARGET, Pilot, classify, command, line_of_sight, look
+from .pilot import Pilot, classify, command, line_of_sight, look
 
 
 @dataclass(frozen=True)
@@ -35,10 +32,8 @@ class Tuning:
 
 
 @kernel
-def _decide(obs, mask, ship_, tuning_, states, actions):
-    ship, k = ship_[0], tuning_[0]
-    own = np.zeros(1, OWN)[0]
-    targets = np.zeros(ship.targets + ship.land, TARGET)
+def _decide(obs, mask, ship_, tuning_, own_, targets, states, actions):
+    ship, k, own = ship_[0], tuning_[0], own_[0]
     for b in range(obs.shape[0]):
         if not mask[b]:
             continue
@@ -89,12 +84,5 @@ class PotentialField(Pilot):
     and give-way encounters, else around on the side where it will be passed.
     """
 
-    @staticmethod
-    def default() -> Tuning:
-        """The parameters."""
-        return Tuning()
-
-    @staticmethod
-    def kernel() -> Any:
-        """See :class:`~usv_gym.policies.pilot.Pilot`."""
-        return _decide
+    parameters = Tuning
+    decide = staticmethod(_decide)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from ..jit import inner, kernel
 from ..trig import clip, sincos, wrap
 from ..units import DEG
-from .pilot import OWN, TARGET, Pilot, command, line_of_sight, look
+from .pilot import Pilot, command, line_of_sight, look
 
 _STEP, _STEPS = 3.0, 20  # [s] of the prediction
 _SPREAD, _OFFSETS = 15.0 * DEG, 17  # headings from 120 deg to port to 120 deg to starboard of the wanted one
@@ -60,10 +57,8 @@ def _danger(turn, share, own, ship, k, targets, found, enough):
 
 
 @kernel
-def _decide(obs, mask, ship_, tuning_, states, actions):
-    ship, k = ship_[0], tuning_[0]
-    own = np.zeros(1, OWN)[0]
-    targets = np.zeros(ship.targets + ship.land, TARGET)
+def _decide(obs, mask, ship_, tuning_, own_, targets, states, actions):
+    ship, k, own = ship_[0], tuning_[0], own_[0]
     for b in range(obs.shape[0]):
         if not mask[b]:
             continue
@@ -106,12 +101,5 @@ class Avoid(Pilot):
     than a margin beyond its radius and its uncertainty.
     """
 
-    @staticmethod
-    def default() -> Tuning:
-        """The parameters."""
-        return Tuning()
-
-    @staticmethod
-    def kernel() -> Any:
-        """See :class:`~usv_gym.policies.pilot.Pilot`."""
-        return _decide
+    parameters = Tuning
+    decide = staticmethod(_decide)

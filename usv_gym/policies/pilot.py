@@ -195,26 +195,19 @@ class NoTuning:
 class Pilot:
     """Base of the built-in controllers.
 
-    A subclass gives a kernel ``decide(obs [B, n], mask [B], ship [1], tuning [1], states [B], actions [B, 2])`` that writes
-    the actions of the rows of ``mask``, and a dataclass of its parameters.
+    A subclass gives the dataclass of its parameters, ``parameters``, and a kernel ``decide(obs [B, n], mask [B], ship [1],
+    tuning [1], own [1], targets [K + sectors of land], states [B], actions [B, 2])`` that writes the actions of the rows of
+    ``mask``; ``own`` and ``targets`` are room to work in.
     """
 
+    parameters: ClassVar[type] = NoTuning
+    decide: ClassVar[Any]
     task: ClassVar[TaskConfig] = LOOKOUT
     TURN_RATE: ClassVar[float] = 0.1
     SPEED_TIME: ClassVar[float] = 8.0
 
     def __init__(self, tuning: Any = None) -> None:
-        self.tuning = self.default() if tuning is None else tuning
-
-    @staticmethod
-    def default() -> Any:
-        """The parameters."""
-        return NoTuning()
-
-    @staticmethod
-    def kernel() -> Any:
-        """The kernel that decides (imported late: it compiles)."""
-        raise NotImplementedError
+        self.tuning = self.parameters() if tuning is None else tuning
 
     # --- one of them -------------------------------------------------------------------------------------------------
     def reset(self, info: Mapping[str, Any]) -> None:
@@ -242,6 +235,7 @@ class Pilot:
         tuning = {key: np.asarray(value, float) for key, value in asdict(self.tuning).items()}
         dtype = np.dtype([(key, "f8", value.shape) for key, value in tuning.items()], align=True)
         self._tuning = record(dtype, tuning)
+        self._own, self._targets = np.zeros(1, OWN), np.zeros(int(values["targets"] + values["land"]), TARGET)
         self._states = np.zeros(num, STATE)
         self._actions = np.zeros((num, 2), np.float32)
         self._all = np.ones(num, np.bool_)
@@ -249,5 +243,5 @@ class Pilot:
     def act_batch(self, observations: NDArray[np.float32], mask: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
         """The actions [B, 2] for observations [B, n]; rows outside of ``mask`` [B] keep what they had.  A view."""
         mask = self._all if mask is None else mask
-        self.kernel()(observations, mask, self._ship, self._tuning, self._states, self._actions)
+        self.decide(observations, mask, self._ship, self._tuning, self._own, self._targets, self._states, self._actions)
         return self._actions

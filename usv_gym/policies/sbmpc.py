@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ..jit import inner, kernel
 from ..trig import atan2, clip, sincos, wrap
 from ..units import DEG
 from ..world.encounter import CROSSING_STAND_ON, OVERTAKEN
-from .pilot import OWN, TARGET, Pilot, classify, command, line_of_sight, look, price_of_slowing, wait
+from .pilot import Pilot, classify, command, line_of_sight, look, price_of_slowing, wait
 
 _STEP = 4.0  # [s] of the prediction
 _STEPS = 45
@@ -155,10 +154,8 @@ def _hazard(path, own, ship, k, targets, found, enough):
 
 
 @kernel
-def _decide(obs, mask, ship_, tuning_, states, actions):
-    ship, k = ship_[0], tuning_[0]
-    own = np.zeros(1, OWN)[0]
-    targets = np.zeros(ship.targets + ship.land, TARGET)
+def _decide(obs, mask, ship_, tuning_, own_, targets, states, actions):
+    ship, k, own = ship_[0], tuning_[0], own_[0]
     path = np.zeros((_STEPS, 4))
     for b in range(obs.shape[0]):
         if not mask[b]:
@@ -207,12 +204,5 @@ class SimulationBasedMPC(Pilot):
     once it has taken effect, and a stand-on vessel acts late (Rule 17).
     """
 
-    @staticmethod
-    def default() -> Tuning:
-        """The parameters."""
-        return Tuning()
-
-    @staticmethod
-    def kernel() -> Any:
-        """See :class:`~usv_gym.policies.pilot.Pilot`."""
-        return _decide
+    parameters = Tuning
+    decide = staticmethod(_decide)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ..jit import inner, kernel
 from ..trig import sincos, wrap
 from ..units import DEG
 from ..world.encounter import CROSSING_GIVE_WAY, CROSSING_STAND_ON, HEAD_ON, OVERTAKEN, SAFE
-from .pilot import OWN, TARGET, Pilot, classify, command, line_of_sight, look, price_of_slowing, wait
+from .pilot import Pilot, classify, command, line_of_sight, look, price_of_slowing, wait
 
 _SPREAD, _OFFSETS = 5.0 * DEG, 49  # headings from 120 deg to port to 120 deg to starboard of the wanted one
 _DELAY = 1.5  # [s] before it begins to turn
@@ -117,10 +116,8 @@ def _cost(turn, offset, speed, own, ship, k, targets, found, arc, enough):
 
 
 @kernel
-def _decide(obs, mask, ship_, tuning_, states, actions):
-    ship, k = ship_[0], tuning_[0]
-    own = np.zeros(1, OWN)[0]
-    targets = np.zeros(ship.targets + ship.land, TARGET)
+def _decide(obs, mask, ship_, tuning_, own_, targets, states, actions):
+    ship, k, own = ship_[0], tuning_[0], own_[0]
     arc = np.zeros((8, 3))  # x, y [m] and time [s] along a turn
     for b in range(obs.shape[0]):
         if not mask[b]:
@@ -169,12 +166,5 @@ class VelocityObstacles(Pilot):
     that acts late and not to port (Rule 17), and turns that can be noticed (Rule 8).
     """
 
-    @staticmethod
-    def default() -> Tuning:
-        """The parameters."""
-        return Tuning()
-
-    @staticmethod
-    def kernel() -> Any:
-        """See :class:`~usv_gym.policies.pilot.Pilot`."""
-        return _decide
+    parameters = Tuning
+    decide = staticmethod(_decide)
