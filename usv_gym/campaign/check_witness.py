@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 from ..colregs.params import Params
 from ..colregs.requirements import Requirement, evaluate, requirement
 from ..colregs.signals import MODE, signals
-from ..colregs.trajectory import Trajectory, TrajectoryRecorder
+from ..colregs.trajectory import Trajectory
 from ..colregs.verdict import Verdict, judge
 from ..config import ConfigError
 from ..envs.core import Core
 from ..tasks.task import OUTCOMES
 from .checks import Assertion
+from .evidence import TruthWitness
 
 Finding = dict[str, Any]  #: what, ok (None: not applicable), value, time [s], text
 
 
-class CheckWitness:
+class CheckWitness(TruthWitness):
     """A witness of a flight (``flight.Witness``); adds ``findings`` to every result: requirements first, then assertions."""
 
     def __init__(
@@ -33,15 +34,6 @@ class CheckWitness:
         self.params = Params.model_validate(params)
         # formulas of assertions are judged like requirements, by the kernels
         self._formulas = {f"assert {k}": requirement(str(one.stl)) for k, one in enumerate(self.asserts) if one.stl is not None}
-
-    def begin(self, core: Core, mask: NDArray[np.bool_]) -> None:
-        """Record the start."""
-        self._recorder = TrajectoryRecorder(core.worlds, int(core.task["max_steps"][0]) + 1, core.model.cruise_speed)
-        self._recorder.begin(mask)
-
-    def sample(self, core: Core, mask: NDArray[np.bool_]) -> None:
-        """Record a step."""
-        self._recorder.sample(mask)
 
     def finish(self, core: Core, rows: int) -> list[dict[str, Any]]:
         """Judge."""

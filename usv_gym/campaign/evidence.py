@@ -23,14 +23,8 @@ ENCOUNTER = ("class", "ship", "complete", "contact", "start", "start_range", "st
              "cpa_time", "cpa_range", "clearance", "safety", "r8", "r13", "r14", "r15", "r16", "r17", "why")  # fmt: skip
 
 
-class Judgement:
-    """A witness that records the truth of a batch and has it judged.
-
-    Adds to a result every number of :attr:`~usv_gym.colregs.verdict.Verdict.episodes`, and ``encounters``.
-    """
-
-    def __init__(self, profile: str = "scaled", params: dict[str, Any] | None = None) -> None:
-        self.params = PROFILES[profile] if params is None else validate(Params, Document("parameters", params))  # type: ignore[index]
+class TruthWitness:
+    """What witnesses that judge have in common: they record the truth of the batch."""
 
     def begin(self, core: Core, mask: NDArray[np.bool_]) -> None:
         """Record the start."""
@@ -40,6 +34,16 @@ class Judgement:
     def sample(self, core: Core, mask: NDArray[np.bool_]) -> None:
         """Record a step."""
         self._recorder.sample(mask)
+
+
+class Judgement(TruthWitness):
+    """A witness that records the truth of a batch and has it judged.
+
+    Adds to a result every number of :attr:`~usv_gym.colregs.verdict.Verdict.episodes`, and ``encounters``.
+    """
+
+    def __init__(self, profile: str = "scaled", params: dict[str, Any] | None = None) -> None:
+        self.params = PROFILES[profile] if params is None else validate(Params, Document("parameters", params))  # type: ignore[index]
 
     def finish(self, core: Core, rows: int) -> list[dict[str, Any]]:
         """Have it judged."""
