@@ -130,6 +130,7 @@ def draw(result: dict[str, Any], target: Path) -> None:
                       label=name if not weather else None)  # fmt: skip
     left.set(xscale="log", yscale="log", xlabel="worlds in the batch", ylabel="environment steps per second, one core",
              title="16 ships, 32 icebergs, 10 sub-steps; dashed: weather")  # fmt: skip
+    left.set_ylim(top=4.0 * left.get_ylim()[1])  # room for the legend
     ships = result["scaling"]["ships"]
     for key, name in (("truth_us", "truth"), ("tracks_us", "tracks")):
         right.plot([r["n"] for r in ships], [r[key] for r in ships], "o-", markersize=4,
@@ -138,7 +139,7 @@ def draw(result: dict[str, Any], target: Path) -> None:
               title="cost against ships, shadows included")  # fmt: skip
     for axes in (left, right):
         axes.grid(True, which="major", alpha=0.3)
-        axes.legend()
+        axes.legend(loc="upper left", ncols=2 if axes is left else 1)
     target.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(target, dpi=110)
     plt.close(figure)

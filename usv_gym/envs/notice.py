@@ -18,5 +18,5 @@ def compiling() -> Iterator[None]:
         from ..jit import is_warm
 
         if not is_warm():
-            print("usv_gym: compiling kernels for this machine, once (one to two minutes) ...", file=sys.stderr, flush=True)
+            print("usv_gym: compiling kernels for this machine, once (about a minute) ...", file=sys.stderr, flush=True)
     yield
