@@ -9,8 +9,22 @@ import numpy as np
 
 from ..units import DEG, KNOT, wrap_360
 from . import shapes
-from .panel import clock, target_name, target_rows, velocity_of
-from .primitives import LAYERS, Area, Circle, Dots, Fringe, Label, Panel, Points, Polygon, Polyline, Primitive, Scene
+from .panel import clock, target_name, velocity_of
+from .primitives import (
+    LAYERS,
+    Area,
+    Circle,
+    Dots,
+    Fringe,
+    Label,
+    Panel,
+    Points,
+    Polygon,
+    Polyline,
+    Primitive,
+    Scene,
+    TargetRow,
+)
 from .sea import DESCRIPTORS, HULLS, OBSTACLES, Detection, Sea, Trail
 
 DOMAIN = (4.0, 1.6)  #: semi-axes of the ship domain along and across, in lengths
@@ -30,7 +44,7 @@ def compose(
     extra: Mapping[str, Iterable[Primitive]] | None = None,
     hide: Sequence[str] = (),
     *,
-    forecast: bool = False,
+    forecast: Sequence[TargetRow] = (),
 ) -> Scene:
     """Scene of one instant.
 
@@ -49,7 +63,7 @@ def compose(
     hide
         names of layers to leave out.
     forecast
-        whether to mark the closest approach to come.
+        rows of the detected targets, to mark the closest approach to come; without them none is.
     """
     layers: Layers = {name: [] for name in LAYERS}
     _land(layers, sea)
@@ -71,7 +85,7 @@ def compose(
     if sea.active[sea.own]:
         _own(layers, sea)
         if forecast:
-            _forecast(layers, sea)
+            _forecast(layers, sea, forecast)
     for name, primitives in (extra or {}).items():
         layers[name].extend(primitives)
     for name in hide:
@@ -232,9 +246,9 @@ def _own(layers: Layers, sea: Sea) -> None:
     layer += _hull(sea, sea.own, "own_hull", "own_house", OWN_PX)
 
 
-def _forecast(layers: Layers, sea: Sea) -> None:
+def _forecast(layers: Layers, sea: Sea, rows: Sequence[TargetRow]) -> None:
     """Where own ship and target will be when they are closest, for the target that the picture says comes closest."""
-    best = min(((row.cpa, row.tcpa, d) for d, row in zip(sea.detections, target_rows(sea), strict=True)
+    best = min(((row.cpa, row.tcpa, d) for d, row in zip(sea.detections, rows, strict=True)
                 if 1.0 < row.tcpa < CPA_SECONDS and row.cpa < CPA_METRES), key=lambda b: b[:2], default=None)  # fmt: skip
     if best is None:
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -93,10 +94,10 @@ def plots(t: Points, speed: Points, heading: Points, closest: Points, marker: fl
     )
 
 
-def panel(sea: Sea, status: tuple[str, ...], curves: tuple[Plot, ...]) -> Panel:
-    """The whole panel of one instant."""
-    rows = sorted(target_rows(sea), key=lambda row: row.range)
-    return Panel(status=status, gauges=gauges(sea), targets=tuple(rows), plots=curves)
+def panel(sea: Sea, rows: Sequence[TargetRow], status: tuple[str, ...], curves: tuple[Plot, ...]) -> Panel:
+    """The whole panel of one instant, with the rows of its targets."""
+    nearest = sorted(rows, key=lambda row: row.range)
+    return Panel(status=status, gauges=gauges(sea), targets=tuple(nearest), plots=curves)
 
 
 def clock(t: float) -> str:

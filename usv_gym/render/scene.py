@@ -9,7 +9,7 @@ import numpy as np
 
 from ..world.land import Coast
 from .compose import compose
-from .panel import panel, plots
+from .panel import panel, plots, target_rows
 from .primitives import Points, Primitive, Scene
 from .scene_episode import scene_from_episode
 from .sea import AisReport, Detection, History, Sea, sides
@@ -57,15 +57,16 @@ def scene_from_snapshot(
     if trails is not None:
         trails.push(sea)
         curves = trails.curves(sea.own)
+    rows = target_rows(sea)
     n, e = sea.here
     return compose(
         sea,
         trails.trails() if trails is not None else {},
-        panel(sea, (f"t = {sea.t:.1f} s", *status), plots(*curves) if curves is not None else ()),
+        panel(sea, rows, (f"t = {sea.t:.1f} s", *status), plots(*curves) if curves is not None else ()),
         (n - half_width, n + half_width, e - half_width, e + half_width),
         extra,
         hide,
-        forecast=True,
+        forecast=rows,
     )
 
 

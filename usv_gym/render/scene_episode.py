@@ -10,7 +10,7 @@ import numpy as np
 
 from ..replay.archive import Episode
 from .compose import compose
-from .panel import clock, panel, plots
+from .panel import clock, panel, plots, target_rows
 from .primitives import Circle, Dots, Label, Points, Polyline, Primitive, Scene
 from .sea import AisReport, Detection, Sea, Trail, sides
 
@@ -70,16 +70,16 @@ def scene_from_episode(
     more: dict[str, list[Primitive]] = {"detections": _past(episode, sea.t), "symbols": marks, "labels": labels}
     for name, primitives in (extra or {}).items():
         more.setdefault(name, []).extend(primitives)
-    (n, e), r = sea.here, half_width or 0.0
+    (n, e), r, rows = sea.here, half_width or 0.0, target_rows(sea)
     trails = {j: _trail(episode, j, sea, future) for j in range(sea.vessels)}
     return compose(
         sea,
         {j: trail for j, trail in trails.items() if len(trail.t) > 1},
-        panel(sea, (f"t = {clock(sea.t)}", *texts), curves),
+        panel(sea, rows, (f"t = {clock(sea.t)}", *texts), curves),
         (n - r, n + r, e - r, e + r) if half_width else _extent(episode, sea),
         more,
         hide,
-        forecast=t is not None,
+        forecast=rows if t is not None else (),
     )
 
 
