@@ -17,7 +17,7 @@ ROW = 20.0  #: [px] height of a row of the table
 LEAST = 3  #: rows of the table that are worth more than a plot
 PLOT = 112.0  #: [px] least height of a plot
 #: columns of the table: title, offset from the left, alignment
-COLUMNS = (("ID", 0.0, 0.0), ("TYPE", 34.0, 0.0), ("RULE", 78.0, 0.0), ("BRG", 174.0, 1.0), ("RNG m", 222.0, 1.0),
+COLUMNS = (("ID", 0.0, 0.0), ("TYPE", 34.0, 0.0), ("RULE", 82.0, 0.0), ("BRG", 174.0, 1.0), ("RNG m", 222.0, 1.0),
            ("CPA m", 268.0, 1.0), ("TCPA s", 318.0, 1.0), ("BY", 330.0, 0.0))  # fmt: skip
 #: encounters in which the own ship has to act; in the others it holds its course
 ACT = ("head on", "give way", "overtaking")
