@@ -10,7 +10,7 @@ from ..config import ConfigError
 from ..replay.archive import plain
 from .flight import FAILED
 from .plan import read_campaign
-from .summary import BETTER, paired
+from .summary import BETTER, chance, paired
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -69,13 +69,13 @@ def _findings(result: Mapping[str, Any], alpha: float, tolerance: float) -> list
     for name, event in result["events"].items():
         change = event["new"] - event["old"]
         tests.append((event["p"], name, change * BETTER[name] < 0, f"{_words(name)} {event['old']} -> {event['new']} "
-                      f"of {result['pairs']} (p = {event['p']:.2g})"))  # fmt: skip
+                      f"of {result['pairs']} ({chance(event['p'])})"))  # fmt: skip
     for name, number in result["numbers"].items():
         p = number["p"] if number["p"] == number["p"] else 1.0
         worse = number["mean"] * BETTER[name] < 0
         known = worse and name in SCORED and abs(number["mean"]) <= tolerance
         tests.append((1.0 if known else p, name, worse and name in SCORED,
-                      f"{_words(name)} {number['mean']:+.3g} (p = {p:.2g})"))  # fmt: skip
+                      f"{_words(name)} {number['mean']:+.3g} ({chance(p)})"))  # fmt: skip
     found = []
     if result["failed"]["new"] > result["failed"]["old"]:
         found.append({"what": f"failed episodes {result['failed']['old']} -> {result['failed']['new']}", "worse": True})
@@ -101,10 +101,10 @@ def print_comparison(result: Mapping[str, Any], console: Console) -> None:
     for label, one in result["policies"].items():
         console.print(f"[bold]{escape(label)}[/]: {one['pairs']:,} pairs", highlight=False)
         for name, event in one["events"].items():
-            said = f"only old {event['only_old']}, only new {event['only_new']}, McNemar p = {event['p']:.3g}"
+            said = f"only old {event['only_old']}, only new {event['only_new']}, McNemar {chance(event['p'])}"
             console.print(f"  {_words(name):16} {event['old']} -> {event['new']}  {said}", highlight=False)
         for name, number in one["numbers"].items():
-            said = "" if number["p"] is None else f", Wilcoxon p = {number['p']:.3g}"
+            said = "" if number["p"] is None else f", Wilcoxon {chance(number['p'])}"
             span = f"({number['low']:+.4g} to {number['high']:+.4g})"
             console.print(f"  {_words(name):16} {number['mean']:+.4g} {span}  n = {number['n']}{said}", highlight=False)
         for finding in one["findings"]:

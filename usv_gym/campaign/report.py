@@ -16,7 +16,7 @@ from ..scenarios.suites import Case
 from .figures import NAMES, RULES, bearing_rose, clearance_histogram, score_boxes, speed_map, track_plot
 from .flight import FAILED, Flight
 from .runner import Fleet
-from .summary import CLASSES, CONTACTS, SCORES, claim, share
+from .summary import CLASSES, CONTACTS, SCORES, chance, claim, share
 
 Row = Mapping[str, Any]
 
@@ -220,7 +220,7 @@ def _paired(pairs: Sequence[Mapping[str, Any]]) -> str:
     lines = []
     for pair in pairs:
         cells = "".join(
-            f"<td>{e['only_old']} : {e['only_new']}<small>p = {e['p']:.2g}</small></td>"
+            f"<td>{e['only_old']} : {e['only_new']}<small>{_e(chance(e['p']))}</small></td>"
             for e in (pair["events"][name] for name in ("collision", "near_miss", "success"))
         )
         for name in ("safety", "r8", "extra_time"):
@@ -228,7 +228,7 @@ def _paired(pairs: Sequence[Mapping[str, Any]]) -> str:
             if s is None:
                 cells += "<td class=zero>-</td>"
                 continue
-            p = "" if s["p"] is None else f", p = {s['p']:.2g}"
+            p = "" if s["p"] is None else f", {_e(chance(s['p']))}"
             cells += f"<td>{s['mean']:+.3g}<small>{s['low']:+.3g} to {s['high']:+.3g}{p}</small></td>"
         lines.append(f"<tr><td>{_e(pair['old'])} : {_e(pair['new'])}</td><td>{pair['pairs']:,}</td>{cells}</tr>")
     heads = ["a : b", "pairs", "collision, a only : b only", "near miss", "success", "safety, b - a", "Rule 8, b - a",

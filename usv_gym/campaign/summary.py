@@ -165,8 +165,13 @@ def claim(policy: Mapping[str, Any]) -> str:
     found = f"{count('collision')}{aground} in {c['n']:,} {'episode' if c['n'] == 1 else 'episodes'}"
     what = "probability of either" if aground else "collision probability"
     if c["rate"] > 0.1:  # nothing that anyone would want to claim
-        return f"{found}: the {what} is {100 * c['low']:.0f} to {100 * c['high']:.0f} % (95 %)"
+        return f"{found}: the {what} is {100 * c['low']:.3g} to {100 * c['high']:.3g} % (95 %)"
     return f"{found}: the {what} is below {share(c['below'])} at 95 %"
+
+
+def chance(p: float) -> str:
+    """``p = 0.021``; what is too small for a number is not called zero."""
+    return f"p = {p:.2g}" if p > 0.0 else "p < 1e-300"
 
 
 def share(x: float) -> str:
