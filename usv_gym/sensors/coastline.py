@@ -12,7 +12,7 @@ import math
 
 from .. import rng
 from ..jit import inner, spliced
-from ..trig import TWO_PI, atan2, sincos, wrap
+from ..trig import TWO_PI, atan2, hypot, sincos, wrap
 from ..world.shore import (
     bearing_sectors,
     clearance,
@@ -92,19 +92,20 @@ def echo_land(w, land, o, k, sensor, reach, tick, count, stream_noise, stream_de
     n, e = w.vessels.eta[own, 0], w.vessels.eta[own, 1]
     echo = t.land[o, k, 0]
     t.land_us[o, k, 0] = tick * w.dt_us
-    nearest_land(land, h, n, e, reach, echo)
+    if not nearest_land(land, h, n, e, reach, echo):
+        return
     for m in range(count):
         s = w.order[m]
         first, sectors = bearing_sectors(w.bearings[s], w.half_angles[s])
         for step in range(sectors):
             i = (first + step) % L
-            r = math.hypot(echo[i, 0], echo[i, 1])
+            r = hypot(echo[i, 0], echo[i, 1])
             if r > w.ranges[s] and abs(wrap(atan2(echo[i, 1], echo[i, 0]) - w.bearings[s])) <= w.half_angles[s]:
                 _look_between(w, land, h, n, e, i, reach, count, echo)
     detection = sensor.detection * w.weather.detection_factor
-    spread = sensor.gain * math.hypot(sensor.noise[0], sensor.bias[0])
+    spread = sensor.gain * hypot(sensor.noise[0], sensor.bias[0])
     for i in range(L):
-        r = math.hypot(echo[i, 0], echo[i, 1])
+        r = hypot(echo[i, 0], echo[i, 1])
         if not r > 0.0:
             continue
         if detection < 1.0 and rng.uniform(w.seed, stream_detection, L * o + i, tick) >= detection:
@@ -136,7 +137,7 @@ def publish_land(w, land, o, tick):
     h = coast(land, w.chart_id)
     north, east = w.nav.position[o, 0], w.nav.position[o, 1]
     at = pic.chart_place[o]
-    if h != 0 and not math.hypot(north - at[0], east - at[1]) <= CHART_STEP:  # NaN: not read yet
+    if h != 0 and not hypot(north - at[0], east - at[1]) <= CHART_STEP:  # NaN: not read yet
         at[0] = north
         at[1] = east
         nearest_land(land, h, north, east, CHART_REACH, pic.chart[o])
@@ -166,8 +167,8 @@ def publish_land(w, land, o, tick):
 def _apart(w, o, i, k):
     """True if the echoes of sectors i and k do not belong to one stretch of coast, or one of them is missing."""
     a, b = w.picture.land[o, i], w.picture.land[o, k]
-    ra = math.hypot(a[0] - w.nav.position[o, 0], a[1] - w.nav.position[o, 1])
-    rb = math.hypot(b[0] - w.nav.position[o, 0], b[1] - w.nav.position[o, 1])
+    ra = hypot(a[0] - w.nav.position[o, 0], a[1] - w.nav.position[o, 1])
+    rb = hypot(b[0] - w.nav.position[o, 0], b[1] - w.nav.position[o, 1])
     return not max(ra, rb) <= max(GAP_RATIO * min(ra, rb), min(ra, rb) + GAP)
 
 
@@ -194,7 +195,7 @@ def _stretches(w, o):
         nearest, where = math.inf, -1
         while True:
             k = i % L
-            r = math.hypot(pic.land[o, k, 0] - north, pic.land[o, k, 1] - east)
+            r = hypot(pic.land[o, k, 0] - north, pic.land[o, k, 1] - east)
             if r < nearest:
                 nearest, where = r, k
             i += 1
@@ -234,9 +235,9 @@ def _stretches(w, o):
             pic.id[o, q] = pic.next_id[o]
         k = at[m]
         seen = pic.land_sensors[o, k]
-        spread = p.radar.gain * math.hypot(p.radar.noise[0], p.radar.bias[0])
+        spread = p.radar.gain * hypot(p.radar.noise[0], p.radar.bias[0])
         if seen & (1 << LIDAR):
-            spread = p.lidar.gain * math.hypot(p.lidar.noise[0], p.lidar.bias[0])
+            spread = p.lidar.gain * hypot(p.lidar.noise[0], p.lidar.bias[0])
         pic.descriptor[o, q] = DESCRIPTOR_LAND
         pic.sensors[o, q] = seen
         pic.motion_known[o, q] = 0

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..jit import inner
-from ..trig import PI, TWO_PI, atan2, sincos
+from ..trig import PI, TWO_PI, atan2
 from .geometry import point_segment
 from .state import L
 
@@ -26,6 +28,8 @@ PIECE = 4  #: numbers of a piece: N, E of its ends
 
 EXACT = 100.0  #: [m] distances below are exact; beyond, to the piece that is nearest to the cell's centre
 _NUDGE = 1.0e-7  #: [m] over a grid line
+_ENDS = (np.arange(L) + 1.0) * (TWO_PI / L)  # bearings at which sectors end [L]
+_BORDERS = np.column_stack([np.sin(_ENDS), np.cos(_ENDS)])  # [L, 2]
 
 
 @inner
@@ -205,42 +209,49 @@ def nearest_land(land, h, n, e, reach, out):
     """Nearest land in each bearing sector around (n, e), within ``reach`` metres.
 
     Writes out [L, 2]: the point relative to (n, e), N and E [m], NaN where there is none.  Nothing on land can hide it,
-    because what hides it is nearer and in the same sector.
+    because what hides it is nearer and in the same sector.  Returns False if it is clear without a look that there is none.
     """
     for i in range(L):
         out[i, 0] = out[i, 1] = math.nan
     if clearance(land, h, n, e) > reach:
-        return
+        return False
     reach2 = reach * reach
     begin, size = h + int(land[h + EDGES]), 4 + RUN * PIECE
     for run in range(begin, begin + size * int(land[h + RUNS]), size):
         dn, de = max(land[run] - n, n - land[run + 2], 0.0), max(land[run + 1] - e, e - land[run + 3], 0.0)
         if dn * dn + de * de > reach2:
             continue
+        last_n = last_e = math.nan  # where the edge before ended, and in which sector: most begin there
+        last = 0
         for k in range(run + 4, run + size, PIECE):
             if point_segment(n, e, land[k], land[k + 1], land[k + 2], land[k + 3]) > reach:
                 continue
             an, ae, bn, be = land[k] - n, land[k + 1] - e, land[k + 2] - n, land[k + 3] - e
-            turn = an * be - ae * bn  # > 0: a to b is clockwise
-            if turn < 0.0:
-                an, ae, bn, be = bn, be, an, ae
-            _sectors_of_piece(out, an, ae, bn, be)
+            first = last if an == last_n and ae == last_e else sector_of(atan2(ae, an))
+            last, last_n, last_e = sector_of(atan2(be, bn)), bn, be
+            if an * be - ae * bn >= 0.0:  # a to b is clockwise
+                _sectors_of_piece(out, first, last, an, ae, bn, be)
+            else:
+                _sectors_of_piece(out, last, first, bn, be, an, ae)
     for i in range(L):
         if out[i, 0] * out[i, 0] + out[i, 1] * out[i, 1] > reach2:
             out[i, 0] = out[i, 1] = math.nan
+    return True
 
 
 @inner
-def _sectors_of_piece(out, an, ae, bn, be):
-    """Cut the piece a, b (clockwise, relative to the observer) at the borders of the sectors and keep what is nearest."""
-    i, last = sector_of(atan2(ae, an)), sector_of(atan2(be, bn))
+def _sectors_of_piece(out, i, last, an, ae, bn, be):
+    """Cut the piece a, b (clockwise, relative to the observer, from sector i to ``last``) at the borders of the sectors.
+
+    What is nearest in each of them is kept.
+    """
     count = (last - i + L) % L
     if count > L // 2:  # on a line with the observer, and on a border
         count = 0
     pn, pe = an, ae
     for _ in range(count):
         # the border ahead: where the piece meets the ray that ends sector i
-        s, c = sincos(sector_bearing(i + 1))
+        s, c = _BORDERS[i, 0], _BORDERS[i, 1]
         p, b = pn * s - pe * c, bn * s - be * c
         t = p / (p - b) if p != b else 0.0
         t = min(max(t, 0.0), 1.0)
