@@ -226,13 +226,19 @@ def _shade_sectors(obs, start, n, bearing, half, closeness):
 
     Sector 0 starts at the bow.
     """
-    width = TWO_PI / n
     closeness = clip(closeness, 0.0, 1.0)
-    first = math.floor((bearing - half) / width)
-    last = math.floor((bearing + half) / width)
-    for i in range(first, min(last, first + n - 1) + 1):
-        at = start + (i + 10 * n) % n
-        obs[at] = max(obs[at], closeness)
+    if closeness == 0.0:
+        return
+    first = int(math.floor((bearing - half) * (n / TWO_PI)))
+    more = int(math.floor((bearing + half) * (n / TWO_PI))) - first
+    i = first
+    while i < 0:
+        i += n
+    for _ in range(min(more, n - 1) + 1):
+        if i >= n:
+            i -= n
+        obs[start + i] = max(obs[start + i], closeness)
+        i += 1
 
 
 @inner

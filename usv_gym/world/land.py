@@ -82,11 +82,21 @@ def index_coast(coast: Sequence[Polygon]) -> Block:
     # to be used as "nothing is nearer": less what rounding may do
     table[:-1, 2] = np.maximum(distance - side * math.sqrt(0.5) - 1e-6, 0.0)
     table[:-1, 3] = inside
-    runs = edges[np.minimum(np.arange(-(-len(edges) // RUN) * RUN), len(edges) - 1)].reshape(-1, RUN, 4)  # the last repeats
-    ends = runs.reshape(len(runs), -1, 2)
-    boxed = np.hstack([ends.min(axis=1), ends.max(axis=1), runs.reshape(len(runs), -1)])
-    header = [n, e, side, rows, columns, start + pieces.size, len(runs)]
-    return np.concatenate([header, table.ravel(), pieces.ravel(), boxed.ravel()])
+    groups = _groups(edges, RUN)
+    header = [n, e, side, rows, columns, start + pieces.size, len(groups)]
+    return np.concatenate([header, table.ravel(), pieces.ravel(), groups.ravel()])
+
+
+def _groups(edges: NDArray[np.float64], run: int) -> NDArray[np.float64]:
+    """Edges [E, 4] in groups: each the box around it, the boxes of its runs, their edges (see world/shore.py)."""
+    last = len(edges) - 1
+    runs = edges[np.minimum(np.arange(-(-len(edges) // run) * run), last)].reshape(-1, run, 2, 2)  # the last repeats
+    boxes = np.hstack([runs.min(axis=(1, 2)), runs.max(axis=(1, 2))])
+    missing = -len(runs) % run  # a group of less than so many runs has boxes at infinity
+    boxes = np.vstack([boxes, np.full((missing, 4), np.inf)]).reshape(-1, run, 4)
+    around = np.hstack([boxes[..., :2].min(axis=1), np.where(boxes < np.inf, boxes, -np.inf)[..., 2:].max(axis=1)])
+    content = np.concatenate([runs.ravel(), np.zeros(missing * run * 4)])
+    return np.hstack([around, boxes.reshape(len(boxes), -1), content.reshape(len(boxes), -1)])
 
 
 def _edges(rings: Iterable[Ring]) -> NDArray[np.float64]:

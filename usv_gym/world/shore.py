@@ -12,24 +12,27 @@ import math
 
 import numpy as np
 
-from ..jit import inner
+from ..jit import inner, scalar
 from ..trig import PI, TWO_PI, atan2
 from .geometry import point_segment
 from .state import L
 
 # header of a block: corner of the grid N, E [m]; side of a cell [m]; rows (north), columns (east)
-# and, for what looks far around, the uncut edges in runs of RUN, each behind the box (south, west, north, east) around it:
-# where they begin in the block, how many runs
-CORNER_N, CORNER_E, SIDE, ROWS, COLUMNS, EDGES, RUNS, CELLS = 0, 1, 2, 3, 4, 5, 6, 7
+# and, for what looks far around, the uncut edges in runs of RUN and groups of RUN runs: where the groups begin in the block, how
+# many; a group is the box (south, west, north, east) around it, the boxes around its runs, and their edges
+CORNER_N, CORNER_E, SIDE, ROWS, COLUMNS, EDGES, GROUPS, CELLS = 0, 1, 2, 3, 4, 5, 6, 7
 RUN = 8
+RINGS = 3  #: in which it looks, each four times as far as the one before
+FEW_CELLS = 12.0  #: up to so many to a side, what looks around goes by cells
 # four numbers per cell from CELLS on, and one more cell as the end of the last; places of pieces count from the block
 FIRST, NEAREST, CLEARANCE, ON_LAND, CELL = 0, 1, 2, 3, 4
 PIECE = 4  #: numbers of a piece: N, E of its ends
+BOX = 4
 
 EXACT = 100.0  #: [m] distances below are exact; beyond, to the piece that is nearest to the cell's centre
 _NUDGE = 1.0e-7  #: [m] over a grid line
-_ENDS = (np.arange(L) + 1.0) * (TWO_PI / L)  # bearings at which sectors end [L]
-_BORDERS = np.column_stack([np.sin(_ENDS), np.cos(_ENDS)])  # [L, 2]
+_BORDERS = np.column_stack([f(np.arange(L + 1) * (TWO_PI / L)) for f in (np.sin, np.cos)])
+"""sine and cosine of the bearings at which sectors begin, and the last one ends [L + 1, 2]"""
 
 
 @inner
@@ -192,16 +195,68 @@ def sector_of(bearing):
 
 
 @inner
-def _closest_part(out, i, an, ae, bn, be):
-    """Keep in out[i] the point of the segment a, b (relative to the observer) if it is nearer than what is there."""
+def _in_sector(i, n, e):
+    """True if the point (n, e), relative to the observer, lies in sector i."""
+    return _BORDERS[i, 1] * e >= _BORDERS[i, 0] * n and _BORDERS[i + 1, 1] * e < _BORDERS[i + 1, 0] * n
+
+
+@scalar
+def _closest_point(an, ae, bn, be):
+    """Point of the segment a, b that is nearest to the origin."""
     dn, de = bn - an, be - ae
     length2 = dn * dn + de * de
     t = min(max(-(an * dn + ae * de) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
-    pn, pe = an + t * dn, ae + t * de
-    d2, old = pn * pn + pe * pe, out[i, 0] * out[i, 0] + out[i, 1] * out[i, 1]
-    if not d2 >= old:  # nothing was there: NaN
-        out[i, 0] = pn
-        out[i, 1] = pe
+    return an + t * dn, ae + t * de
+
+
+@scalar
+def _keep(out, i, n, e):
+    """Keep a point (relative to the observer) in out[i] if it is nearer than what is there."""
+    if not n * n + e * e >= out[i, 0] * out[i, 0] + out[i, 1] * out[i, 1]:  # nothing was there: NaN
+        out[i, 0] = n
+        out[i, 1] = e
+
+
+@inner
+def _worth_a_look(land, box, n, e, inner2, outer2, out):
+    """True if a box begins more than sqrt(inner2) and at most sqrt(outer2) metres from (n, e), and out has not something
+    nearer in each of its sectors."""
+    south, west, north, east = land[box] - n, land[box + 1] - e, land[box + 2] - n, land[box + 3] - e
+    dn, de = max(south, -north, 0.0), max(west, -east, 0.0)
+    d2 = dn * dn + de * de
+    if d2 <= inner2 or d2 > outer2:
+        return False
+    cn, ce = 0.5 * (south + north), 0.5 * (west + east)
+    radius2 = (north - cn) * (north - cn) + (east - ce) * (east - ce)
+    clear2 = cn * cn + ce * ce - radius2
+    if not clear2 > radius2:
+        return True
+    first, count = bearing_sectors(atan2(ce, cn), math.sqrt(radius2 / clear2))  # the tangent of its half-angle: not less
+    for k in range(first, first + count):
+        i = k - L if k >= L else k
+        if not out[i, 0] * out[i, 0] + out[i, 1] * out[i, 1] < d2:
+            return True
+    return False
+
+
+@inner
+def _keep_nearest(land, begin, end, n, e, reach, out):
+    """Keep what of the pieces or edges from ``begin`` to ``end`` is nearest in its sector."""
+    last_n = last_e = math.nan  # where the edge before ended, and in which sector: most begin there
+    last = 0
+    for k in range(begin, end, PIECE):
+        an, ae, bn, be = land[k] - n, land[k + 1] - e, land[k + 2] - n, land[k + 3] - e
+        pn, pe = _closest_point(an, ae, bn, be)
+        if pn * pn + pe * pe > reach * reach:
+            continue
+        first = last if an == last_n and ae == last_e else sector_of(atan2(ae, an))
+        last, last_n, last_e = first if _in_sector(first, bn, be) else sector_of(atan2(be, bn)), bn, be
+        if first == last:
+            _keep(out, first, pn, pe)
+        elif an * be - ae * bn >= 0.0:  # a to b is clockwise
+            _keep_parts(out, first, last, an, ae, bn, be)
+        else:
+            _keep_parts(out, last, first, bn, be, an, ae)
 
 
 @inner
@@ -215,32 +270,38 @@ def nearest_land(land, h, n, e, reach, out):
         out[i, 0] = out[i, 1] = math.nan
     if clearance(land, h, n, e) > reach:
         return False
-    reach2 = reach * reach
-    begin, size = h + int(land[h + EDGES]), 4 + RUN * PIECE
-    for run in range(begin, begin + size * int(land[h + RUNS]), size):
-        dn, de = max(land[run] - n, n - land[run + 2], 0.0), max(land[run + 1] - e, e - land[run + 3], 0.0)
-        if dn * dn + de * de > reach2:
-            continue
-        last_n = last_e = math.nan  # where the edge before ended, and in which sector: most begin there
-        last = 0
-        for k in range(run + 4, run + size, PIECE):
-            if point_segment(n, e, land[k], land[k + 1], land[k + 2], land[k + 3]) > reach:
-                continue
-            an, ae, bn, be = land[k] - n, land[k + 1] - e, land[k + 2] - n, land[k + 3] - e
-            first = last if an == last_n and ae == last_e else sector_of(atan2(ae, an))
-            last, last_n, last_e = sector_of(atan2(be, bn)), bn, be
-            if an * be - ae * bn >= 0.0:  # a to b is clockwise
-                _sectors_of_piece(out, first, last, an, ae, bn, be)
-            else:
-                _sectors_of_piece(out, last, first, bn, be, an, ae)
+    if reach <= FEW_CELLS * land[h + SIDE]:
+        first, last = _index(land, h, 1, e - reach), _index(land, h, 1, e + reach)
+        for row in range(_index(land, h, 0, n - reach), _index(land, h, 0, n + reach) + 1):
+            begin = h + int(land[_cell(land, h, row, first) + FIRST])
+            _keep_nearest(land, begin, h + int(land[_cell(land, h, row, last) + CELL + FIRST]), n, e, reach, out)
+    else:
+        _look_far(land, h, n, e, reach, out)
     for i in range(L):
-        if out[i, 0] * out[i, 0] + out[i, 1] * out[i, 1] > reach2:
+        if out[i, 0] * out[i, 0] + out[i, 1] * out[i, 1] > reach * reach:  # the rest of a piece that begins in reach
             out[i, 0] = out[i, 1] = math.nan
     return True
 
 
 @inner
-def _sectors_of_piece(out, i, last, an, ae, bn, be):
+def _look_far(land, h, n, e, reach, out):
+    """The same with edges by their boxes: a box that is behind what is found already has nothing to add."""
+    begin, size = h + int(land[h + EDGES]), BOX + RUN * (BOX + RUN * PIECE)
+    end = begin + size * int(land[h + GROUPS])
+    inner2 = -1.0
+    for ring in range(RINGS):  # what is near goes first, so that most of what is far is behind it
+        outer2 = reach * reach * 0.0625 ** (RINGS - 1 - ring)
+        for group in range(begin, end, size):
+            if _worth_a_look(land, group, n, e, -1.0, outer2, out):
+                for k in range(RUN):
+                    if _worth_a_look(land, group + BOX * (1 + k), n, e, inner2, outer2, out):
+                        run = group + BOX * (1 + RUN) + RUN * PIECE * k
+                        _keep_nearest(land, run, run + RUN * PIECE, n, e, reach, out)
+        inner2 = outer2
+
+
+@inner
+def _keep_parts(out, i, last, an, ae, bn, be):
     """Cut the piece a, b (clockwise, relative to the observer, from sector i to ``last``) at the borders of the sectors.
 
     What is nearest in each of them is kept.
@@ -248,18 +309,18 @@ def _sectors_of_piece(out, i, last, an, ae, bn, be):
     count = (last - i + L) % L
     if count > L // 2:  # on a line with the observer, and on a border
         count = 0
-    pn, pe = an, ae
     for _ in range(count):
         # the border ahead: where the piece meets the ray that ends sector i
-        s, c = _BORDERS[i, 0], _BORDERS[i, 1]
-        p, b = pn * s - pe * c, bn * s - be * c
-        t = p / (p - b) if p != b else 0.0
-        t = min(max(t, 0.0), 1.0)
-        qn, qe = pn + t * (bn - pn), pe + t * (be - pe)
-        _closest_part(out, i, pn, pe, qn, qe)
-        pn, pe = qn, qe
+        s, c = _BORDERS[i + 1, 0], _BORDERS[i + 1, 1]
+        a, b = an * s - ae * c, bn * s - be * c
+        t = min(max(a / (a - b), 0.0), 1.0) if a != b else 0.0
+        qn, qe = an + t * (bn - an), ae + t * (be - ae)
+        pn, pe = _closest_point(an, ae, qn, qe)
+        _keep(out, i, pn, pe)
+        an, ae = qn, qe
         i = i + 1 if i + 1 < L else 0
-    _closest_part(out, i, pn, pe, bn, be)
+    pn, pe = _closest_point(an, ae, bn, be)
+    _keep(out, i, pn, pe)
 
 
 @inner
