@@ -21,8 +21,6 @@ from usv_gym.world.state import EVENTS
 FERRY = {"class": "ship", "length": 60, "speed": 4.0, "waypoints": [[150, -100], [150, 900]], "ais": "A"}
 TUG = {"class": "boat", "speed": 3.0, "waypoints": [[250, 200], [250, -600]], "ais": "B"}
 SEA = {
-    # traffic moves every tick: in longer frames, positions that a sensor asks for on the way are rounded once more
-    "simulation": {"traffic_interval": 0.05},
     "own_ship": {"speed": 3.0, "route": [[900, 0]]},
     "ships": {"ferry": FERRY, "tug": TUG},
     "obstacles": {"berg": {"position": [60, 40], "radius": 8}},

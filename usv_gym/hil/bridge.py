@@ -22,6 +22,7 @@ from ..config import ConfigError
 from ..engine import settle_traffic
 from ..replay.recorder import Recorder
 from ..run import plan
+from ..scenarios.build import carry_on_from_here
 from ..scenarios.loader import Source, load_scenario
 from ..voyage import ENDLESS, Mission, Voyage
 from ..world.state import BEHAVIOUR_HOLD, MODEL_KINEMATIC
@@ -349,13 +350,14 @@ class Bridge:
         settle_traffic(self.voyage.core.worlds)
         heading = float(news.get("heading", v["eta"][0, 2]))
         if "north" in news:
-            v["eta"][0, :2] = v["frame_eta"][0, :2] = news["north"], news["east"]
+            v["eta"][0, :2] = news["north"], news["east"]
         speed = float(news.get("sog", v["speed"][0]))
         course = float(news["course"]) if "course" in news and "heading" not in news else heading
-        v["eta"][0, 2] = v["frame_eta"][0, 2] = v["heading_set"][0] = heading
+        v["eta"][0, 2] = v["heading_set"][0] = heading
         v["speed"][0] = v["nu"][0, 0] = speed
         v["nu"][0, 2] = float(news.get("yaw_rate", v["nu"][0, 2]))
         v["velocity"][0] = speed * math.cos(course), speed * math.sin(course)
+        carry_on_from_here(self._world, 0)
 
 
 class _Forgetful(Recorder):

@@ -255,6 +255,24 @@ def write_agent(
             w["nav"]["leg"][o] = 1
 
 
+def carry_on_from_here(w: Any, source: int) -> None:
+    """After a source was put somewhere within a traffic frame: let the frame begin where it would have come from.
+
+    Traffic is carried from where it was as the frame began (traffic/ships.py).
+    """
+    v, m = w["vessels"], w["obstacles"]
+    seconds = float((w["tick"] - w["frame_tick"]) * w["dt"])
+    V = len(v["active"])
+    if source >= V:
+        i = source - V
+        current = np.array(w["weather"]["current"])
+        m["frame_position"][i] = m["position"][i] - (m["velocity"][i] + m["drifts"][i] * current) * seconds
+    else:
+        v["frame_eta"][source] = v["eta"][source]
+        if v["model"][source] == state.MODEL_KINEMATIC:
+            v["frame_eta"][source] -= np.array([*v["velocity"][source], v["nu"][source, 2]]) * seconds
+
+
 def write_ship(scenario: Scenario, w: Any, j: int, name: str, mmsi: int, slots: Mapping[str, int]) -> None:
     """Write ship ``name`` of a scenario into the empty vessel slot j of a record; ``slots`` are those of all names."""
     ship = scenario.ships[name]

@@ -18,7 +18,7 @@ from ..config import ConfigError, Document, suggestion, validate
 from ..units import DEG
 from ..world.state import BEHAVIOUR_HOLD, BEHAVIOUR_REPLAY, BEHAVIOUR_WAYPOINTS, KIND_BOAT, KIND_SHIP, KIND_VESSEL, T, W
 from .behaviours import Behaving, KeepCourse, write_behaviour
-from .build import Names, Worlds, write_obstacle, write_ship
+from .build import Names, Worlds, carry_on_from_here, write_obstacle, write_ship
 from .events import happened
 from .schema import OWN_SHIP, Obstacle, Scenario, Ship
 
@@ -102,10 +102,9 @@ class Commands:
         scenario = self.scenario.model_copy(update={group: {id: thing}})
         if ship:
             write_ship(scenario, self._w, slot, id, mmsi, {OWN_SHIP: 0, id: slot})
-            self._w["vessels"]["frame_eta"][slot] = self._w["vessels"]["eta"][slot]
         else:
             write_obstacle(scenario, self._w, slot, id, mmsi)
-            self._w["obstacles"]["frame_position"][slot] = self._w["obstacles"]["position"][slot]
+        carry_on_from_here(self._w, source)
         self._listen(source)
         self.names[source] = self.called[source] = id
         self._note("spawned", source, "spawn", {"id": id, "spec": dict(spec)})
@@ -131,13 +130,14 @@ class Commands:
         if "eta" in (group.dtype.names or ()):
             psi = group["eta"][slot, 2] if heading_deg is None else heading_deg * DEG
             self._end_replay(slot, BEHAVIOUR_HOLD, psi)
-            group["eta"][slot] = group["frame_eta"][slot] = north, east, psi
+            group["eta"][slot] = north, east, psi
             speed = group["nu"][slot, 0]
             if group["plant"][slot] < 0:
                 group["heading_set"][slot] = psi
                 group["velocity"][slot] = speed * math.cos(psi), speed * math.sin(psi)
         else:
-            group["position"][slot] = group["frame_position"][slot] = north, east
+            group["position"][slot] = north, east
+        carry_on_from_here(self._w, source)
         self._note("moved", source, "move", {"id": id, "north": north, "east": east, "heading_deg": heading_deg})
 
     def set_waypoints(self, id: str, waypoints: Sequence[Sequence[float]]) -> None:

@@ -111,23 +111,26 @@ def steer(w, seconds):
 
 @inner
 def move_traffic(w, tick):
-    """Carry all traffic from ``traffic_tick`` to ``tick``."""
-    seconds = (tick - w.traffic_tick) * w.dt
-    if seconds == 0.0:
+    """Carry all traffic to ``tick``: always from where it was as the frame began, so that nobody who looks on the way leaves
+    a trace in the last digit."""
+    if tick == w.traffic_tick:
         return
+    whole, part = (tick - w.frame_tick) * w.dt, (tick - w.traffic_tick) * w.dt
     w.traffic_tick = tick
     v, m = w.vessels, w.obstacles
     for j in range(v.active.shape[0]):
-        h = seconds if (v.active[j] != 0) & (v.model[j] == MODEL_KINEMATIC) else 0.0
-        v.eta[j, 0] += v.velocity[j, 0] * h
-        v.eta[j, 1] += v.velocity[j, 1] * h
-        psi = v.eta[j, 2] + v.nu[j, 2] * h
-        v.eta[j, 2] = wrap(psi) if abs(psi) > MANY_TURNS else psi  # a ship on a loop for weeks
-    for j in range(v.active.shape[0]):
-        h = seconds if (v.active[j] != 0) & (v.model[j] == MODEL_KINEMATIC) else 0.0
-        v.distance[j] += abs(v.nu[j, 0]) * h
+        moves = (v.active[j] != 0) & (v.model[j] == MODEL_KINEMATIC)
+        north, east = v.frame_eta[j, 0] + v.velocity[j, 0] * whole, v.frame_eta[j, 1] + v.velocity[j, 1] * whole
+        psi = v.frame_eta[j, 2] + v.nu[j, 2] * whole
+        v.eta[j, 0] = north if moves else v.eta[j, 0]
+        v.eta[j, 1] = east if moves else v.eta[j, 1]
+        psi = wrap(psi) if abs(psi) > MANY_TURNS else psi  # a ship on a loop for weeks
+        v.eta[j, 2] = psi if moves else v.eta[j, 2]
+        v.distance[j] += abs(v.nu[j, 0]) * (part if moves else 0.0)
     cn, ce = w.weather.current[0], w.weather.current[1]
     for i in range(m.active.shape[0]):
-        h = seconds if m.active[i] != 0 else 0.0
-        m.position[i, 0] += (m.velocity[i, 0] + m.drifts[i] * cn) * h
-        m.position[i, 1] += (m.velocity[i, 1] + m.drifts[i] * ce) * h
+        moves = m.active[i] != 0
+        north = m.frame_position[i, 0] + (m.velocity[i, 0] + m.drifts[i] * cn) * whole
+        east = m.frame_position[i, 1] + (m.velocity[i, 1] + m.drifts[i] * ce) * whole
+        m.position[i, 0] = north if moves else m.position[i, 0]
+        m.position[i, 1] = east if moves else m.position[i, 1]
