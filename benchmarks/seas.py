@@ -13,7 +13,7 @@ WEATHER = {
 
 
 def crowded_sea(ships: int = 16, icebergs: int = 32, *, weather: bool = False, dt: float = 0.1,
-                traffic_interval: float = 0.5) -> dict[str, Any]:  # fmt: skip
+                traffic_interval: float = 1.0) -> dict[str, Any]:  # fmt: skip
     """A scenario mapping: ships cross at 300 to 1400 m, icebergs stand at 150 to 1700 m; nobody is ever far away."""
     scenario: dict[str, Any] = {
         "name": f"crowded_{ships}_{icebergs}",

@@ -72,7 +72,7 @@ def crews(seconds: float, sizes: tuple[int, ...]) -> list[dict[str, Any]]:
 
 def scaling(seconds: float, quick: bool) -> dict[str, Any]:
     """Microseconds per step of one world (B = 16) against what there is in it, sensors and shadows included."""
-    result: dict[str, Any] = {"ships": [], "obstacles": [], "sub_steps": []}
+    result: dict[str, Any] = {"ships": [], "obstacles": [], "frames": [], "sub_steps": []}
 
     def cost(observation: str, worlds: int = 16, **kwargs: Any) -> float:
         return 1e6 / faces.batch(seconds, worlds, **faces.arguments(observation, "thesis", faces.sea(**kwargs)))["steps_per_s"]
@@ -90,8 +90,12 @@ def scaling(seconds: float, quick: bool) -> dict[str, Any]:
         row = {"n": n, "tracks_us": cost("tracks", icebergs=n), "truth_us": cost("truth", icebergs=n)}
         result["obstacles"].append(row)
         print(f"  {n:4} obstacles  truth {row['truth_us']:8.2f} us, tracks {row['tracks_us']:8.2f} us", flush=True)
+    for frames in (1, 10) if quick else (1, 2, 5, 10):
+        row = {"n": frames, "truth_us": cost("truth", worlds=64, traffic_interval=1.0 / frames)}
+        result["frames"].append(row)
+        print(f"  {frames:4} frames     truth {row['truth_us']:8.2f} us", flush=True)
     for dt in TICKS[:2] if quick else TICKS:
-        row = {"n": round(1.0 / dt), "truth_us": cost("truth", worlds=64, dt=dt, traffic_interval=max(dt, 0.5 // dt * dt))}
+        row = {"n": round(1.0 / dt), "truth_us": cost("truth", worlds=64, dt=dt)}
         result["sub_steps"].append(row)
         print(f"  {row['n']:4} sub-steps  truth {row['truth_us']:8.2f} us", flush=True)
     return result

@@ -39,7 +39,6 @@ class SB3VecEnv(VecEnv):
     def __init__(self, env: USVVectorEnv, *, reward_scale: float = 1.0) -> None:
         self.env = env
         self.reward_scale = reward_scale
-        self._all = np.ones(env.num_envs, np.bool_)
         self._returns = np.zeros(env.num_envs)
         self._began = time.perf_counter()
         self._actions: Any = None
@@ -69,7 +68,7 @@ class SB3VecEnv(VecEnv):
     def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Advance all rows by one control interval."""
         env, core = self.env, self.env.core
-        env.advance(self._actions, self._all)
+        env.advance(self._actions)
         done = core.terminated | core.truncated
         reward = (core.reward * self.reward_scale).astype(np.float32)
         self._returns += core.reward

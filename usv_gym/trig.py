@@ -1,8 +1,9 @@
-"""Scalar math for the kernels: polynomial sine, cosine, arctangent and logarithm, distances, and angle wrapping.
+"""Scalar math for the kernels: polynomial sine, cosine, arctangent, logarithm and exponential, distances, and angle wrapping.
 
 libm's calls keep LLVM from vectorising a loop and cost about 12 ns each; these are branch-free and cost 1 to 2 ns.
 Coefficients: Moshier's Cephes library (sin.c) with the reduction by Cody and Waite, error at most 4.5e-16 for |x| < 1e5;
-arctangent and logarithm are those of Sun's fdlibm (s_atan.c, e_log.c), error about one unit in the last place.
+arctangent, logarithm and exponential are those of Sun's fdlibm (s_atan.c, e_log.c, e_exp.c), error about one unit in the last
+place.
 """
 
 from __future__ import annotations
@@ -101,6 +102,21 @@ def log(x):
         + z * 1.479819860511658591e-01))))))  # fmt: skip
     half = 0.5 * f * f
     return k * 6.93147180369123816490e-01 - ((half - (s * (half + r) + k * 1.90821492927058770002e-10)) - f)
+
+
+@scalar
+def exp(x):
+    """e to the power of x, for x up to 700; below -700 as at -700."""
+    x = -700.0 if x < -700.0 else x
+    k = np.floor(x * 1.44269504088896338700 + 0.5)
+    high = x - k * 6.93147180369123816490e-01
+    low = k * 1.90821492927058770002e-10
+    r = high - low
+    t = r * r
+    c = r - t * (1.66666666666666019037e-01 + t * (-2.77777777770155933842e-03 + t * (6.61375632143793436117e-05
+        + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08))))  # fmt: skip
+    y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
+    return y * np.int64((np.int64(k) + 1023) << 52).view(np.float64)
 
 
 @scalar

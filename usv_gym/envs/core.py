@@ -42,6 +42,8 @@ from ..world.vessel import VesselModel, load_vessel
 from .threads import Crew
 
 _OUTCOME_TEXTS = np.array(OUTCOMES, object)
+_ARRIVAL = OUTCOMES.index("arrival")
+_TERM_KEYS = tuple((term, f"_{term}") for term in TERMS)
 _WORTH_SHARING = 16  # rows; fewer are done by one thread before another wakes up
 NO_ROWS = np.zeros((0, 0, A, 3))
 _WEATHERS = ("calm", "random", "thesis")
@@ -129,6 +131,7 @@ class Core:
         self.terminated, self.truncated = self.episodes["terminated"], self.episodes["truncated"]
         self._what, self._outcome = self.episodes["what"], self.episodes["outcome"]
         self._closest, self._to_go = self.episodes["closest"], self.episodes["to_go"]
+        self._no_texts = np.full(self.num, OUTCOMES[0], object)
         self._tick = self.worlds["tick"]
         # by row, for the single environment: making a view costs as much as half a kernel call
         self._rows = list(zip(self.obs, self.actions, self.terms, strict=True))
@@ -286,7 +289,7 @@ class Core:
         if mask is None:
             self._what.fill(STEP)
         else:
-            self._what[:] = np.where(mask, STEP, 0)
+            np.multiply(mask, STEP, out=self._what, casting="unsafe")
         bad = self._run(rows)
         if bad >= 0:
             expected = "a whole number from 0 to 4" if self.config.action == "discrete" else "finite numbers"
@@ -348,20 +351,25 @@ class Core:
         Every key has an array [B], with zeros (None among texts) in the other rows, and a mask under ``_key``.
         """
         terms = self.terms.T.copy()
-        outcome = self.episodes["outcome"]
-        columns = {
-            "time": self.worlds["tick"] * self.worlds["dt"],
-            "closest": self.episodes["closest"].copy(),
-            "to_go": self.episodes["to_go"].copy(),
-            "outcome": _OUTCOME_TEXTS[outcome],
-            "is_success": outcome == OUTCOMES.index("arrival"),
-        }
+        outcome = self._outcome.copy()
+        time, closest, to_go = self._tick * self._dt, self._closest.copy(), self._to_go.copy()
+        texts = _OUTCOME_TEXTS[outcome] if outcome.any() else self._no_texts.copy()
+        success = outcome == _ARRIVAL
         if not mask.all():
             others = ~mask
             terms[:, others] = 0.0
-            for key, column in columns.items():
-                column[others] = None if key == "outcome" else 0
-        return masked({"reward_terms": masked(dict(zip(TERMS, terms, strict=True)), mask), **columns}, mask)
+            texts[others] = None
+            for column in (time, closest, to_go, success):
+                column[others] = 0
+        # written out, as this is done in every step
+        rewards: dict[str, Any] = {}
+        for (key, masked_key), term in zip(_TERM_KEYS, terms, strict=True):
+            rewards[key] = term
+            rewards[masked_key] = mask
+        return {
+            "reward_terms": rewards, "_reward_terms": mask, "time": time, "_time": mask, "closest": closest, "_closest": mask,
+            "to_go": to_go, "_to_go": mask, "outcome": texts, "_outcome": mask, "is_success": success, "_is_success": mask
+        }  # fmt: skip
 
 
 def masked(columns: Mapping[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:

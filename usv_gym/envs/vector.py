@@ -177,6 +177,8 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         self.generators, self.seeds = [generator for generator, _ in owned], [seed for _, seed in owned]
         self._all = np.ones(num_envs, np.bool_)
         self._started = np.zeros(num_envs, np.bool_)
+        self._all_started = False
+        self._action_shape = self.action_space.shape
         self._ended = np.zeros(num_envs, np.bool_)
 
     @property  # type: ignore[misc]
@@ -197,8 +199,8 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         for b in np.flatnonzero(mask).tolist():
             self.rows[b].forget()
 
-    def advance(self, actions: Any, mask: NDArray[np.bool_]) -> None:
-        """One control step of the rows of ``mask`` [B]; what comes of it is in ``core``.
+    def advance(self, actions: Any, mask: NDArray[np.bool_] | None = None) -> None:
+        """One control step of the rows of ``mask`` [B], or of all; what comes of it is in ``core``.
 
         Raises
         ------
@@ -207,11 +209,11 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         ValueError
             if the actions have a wrong shape or one is not finite.
         """
-        if not self._started.all():
+        if not self._all_started:
             raise gym.error.ResetNeeded("call reset() before step()")
         try:
             given = np.asarray(actions)
-            fits = given.shape == self.action_space.shape
+            fits = given.shape == self._action_shape
             if fits:
                 self.core.actions[:] = given.reshape(self.core.actions.shape)
         except (ValueError, TypeError):
@@ -247,6 +249,7 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
                 self.generators[b], self.seeds[b] = np_random(seeds[b])
         self.begin(mask)
         self._started[mask] = True
+        self._all_started = bool(self._started.all())
         self._ended = self._ended & ~mask
         return self.observation(), self._reset_infos(self.core.infos(mask), mask)
 
@@ -254,18 +257,20 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         """Advance all rows by one control interval; see ``autoreset_mode`` for those whose episode has ended."""
         core, ended = self.core, self._ended
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
-            self.advance(actions, ~ended)
             if ended.any():
+                self.advance(actions, ~ended)
                 self.begin(ended)
+            else:
+                self.advance(actions)
         elif self.autoreset_mode is AutoresetMode.DISABLED:
             if ended.any():
                 raise gym.error.ResetNeeded(
                     f"the episodes of rows {np.flatnonzero(ended).tolist()} have ended: reset them with "
                     "reset(options={'reset_mask': mask})"
                 )
-            self.advance(actions, self._all)
+            self.advance(actions)
         else:
-            self.advance(actions, self._all)
+            self.advance(actions)
         reward, terminated, truncated = core.reward.copy(), core.terminated.copy(), core.truncated.copy()
         over = terminated | truncated
         infos: dict[str, Any] = {}

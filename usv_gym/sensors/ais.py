@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import rng
 from ..jit import inner
-from ..trig import atan2, hypot, wrap, wrap_positive
+from ..trig import atan2, exp, hypot, wrap, wrap_positive
 from ..units import DEG, DEG_PER_MIN, KNOT
 from ..world.state import AIS_ATON, AIS_CLASS_A, AIS_CLASS_B
 from .noise import noise_slot, pair_slot
@@ -120,7 +120,7 @@ def transmit(w, s, tick):
         if fresh or p.ais_bias_time[k] <= 0.0:
             a.bias[s, k] = p.ais_bias[k] * drive[k]
         else:
-            decay = math.exp(-seconds / p.ais_bias_time[k])
+            decay = exp(-seconds / p.ais_bias_time[k])
             a.bias[s, k] = decay * a.bias[s, k] + p.ais_bias[k] * math.sqrt(1.0 - decay * decay) * drive[k]
     kind = ais_class(w, s)
     if s < V:

@@ -52,3 +52,4 @@ def false_alarms(w, o, k, sensor, reach, rate, tick, stream):
             measured[2] = w.sensors.radius_min * (1.0 + rng.uniform(w.seed, stream, slot + 3, tick))
             measured[3] = max(sensor.gain * d, sensor.gain_floor)
         t.measured_us[o, k, s] = now
+        t.scan_found[o, k] += 1

@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from ..jit import inner
-from ..trig import wrap
+from ..trig import exp, wrap
 from .motion import column, correct, correct_row, predict_motion, start_motion
 
 #: Standard deviation of a yaw rate of which nothing is known: 1 deg/s [rad/s]
@@ -44,7 +44,7 @@ def predict_scan(x, P, h, sensors, scan):
     """Move a radar or LiDAR filter by h [s]."""
     if h > 0.0:
         predict_motion(x, P, 9, h, sensors)
-        a = math.exp(-h / scan.bias_time[0])
+        a = exp(-h / scan.bias_time[0])
         for i in range(7, 9):
             _predict_bias(x, P, 9, i, a, scan.bias[0])
 
@@ -59,7 +59,7 @@ def predict_ais(x, P, h, sensors):
             field = _field(i)
             if sensors.ais_bias_time[field] != T:  # most are equal, and an exponential is dear
                 T = sensors.ais_bias_time[field]
-                a = math.exp(-h / T)
+                a = exp(-h / T)
             _predict_bias(x, P, 12, 7 + i, a, sensors.ais_bias[field])
 
 
@@ -79,7 +79,7 @@ def _predict_bias(x, P, n, i, a, bias):
 def predict_position(x, P, h, bias, bias_time):
     """Move a static filter by h [s]: only its sensor biases (standard deviation [m], time constant [s]) change."""
     if h > 0.0:
-        a = math.exp(-h / bias_time)
+        a = exp(-h / bias_time)
         x[7] *= a
         x[8] *= a
         P[_BN_N] = P[_BE_E] = a * P[_BN_N]
@@ -90,7 +90,7 @@ def predict_position(x, P, h, bias, bias_time):
 def predict_size(x, P, h, scan):
     """Move a size filter by h [s]: the radius is constant, its bias is not."""
     if h > 0.0:
-        a = math.exp(-h / scan.bias_time[1])
+        a = exp(-h / scan.bias_time[1])
         x[1] *= a
         P[1] *= a
         P[2] = a * a * P[2] + scan.bias[1] * scan.bias[1] * (1.0 - a * a)

@@ -14,12 +14,10 @@ docs/tracking.md compares the two.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..jit import inner
-from ..trig import sincos
+from ..trig import exp, sincos
 from ..world.state import PHASE_MOTION, PHASE_NONE
 from . import ekf
 
@@ -29,7 +27,7 @@ def predict(x, P, h, q, bias, bias_time):
     """Move a filter by h [s]; q is the density of the acceleration, ``bias`` the stationary deviation of the bias."""
     if h <= 0.0:
         return
-    a = math.exp(-h / bias_time)
+    a = exp(-h / bias_time)
     x[0] += h * x[2]
     x[1] += h * x[3]
     x[4] *= a
@@ -109,7 +107,7 @@ def ais_velocity(psi, u, h, sensors):
 @inner
 def _variance(noise, bias, bias_time, h):
     """Variance of white noise that lets means converge as slowly as this noise with its bias does (see ``tracker``)."""
-    a = math.exp(-h / bias_time) if bias_time > 0.0 and h > 0.0 else 0.0
+    a = exp(-h / bias_time) if bias_time > 0.0 and h > 0.0 else 0.0
     return ekf.white(1.0, noise) + bias * bias * (1.0 + a) / (1.0 - a)
 
 

@@ -12,7 +12,7 @@ import math
 
 from .. import rng
 from ..jit import inner, spliced
-from ..trig import hypot
+from ..trig import exp, hypot
 from ..world.state import LIDAR, RADAR
 from .clutter import false_alarms
 from .coastline import deliver_land, echo_land, hide_behind_land
@@ -29,6 +29,8 @@ def deliver(w, o, k, tick):
         return
     t.scan_due[o, k] = -1
     deliver_land(w, o, k)
+    if t.scan_found[o, k] == 0:
+        return
     for s in range(t.id.shape[1]):
         if t.measured_us[o, k, s] == t.scan_us[o, k]:
             if k == RADAR - 1:
@@ -40,7 +42,7 @@ def deliver(w, o, k, tick):
 @inner
 def _decay(bias, bias_time, seconds):
     """Share of a bias [m] that is left after so long, and standard deviation of what is new."""
-    a = math.exp(-seconds / bias_time) if seconds >= 0.0 and bias_time > 0.0 else 0.0
+    a = exp(-seconds / bias_time) if seconds >= 0.0 and bias_time > 0.0 else 0.0
     return a, bias * math.sqrt(1.0 - a * a)
 
 
@@ -54,6 +56,7 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
         t.visible[o, k, s] = 0
     if sensor.outage:
         return
+    t.scan_found[o, k] = 0
     count = look_around(w, own, reach)
     cast_shadows(w, count)
     hide_behind_land(w, land, own, count)
@@ -69,9 +72,9 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
         d = w.ranges[s]
         if d < sensor.range_min:
             continue
-        shown = apparent_half_width(w, s)
         detection = sensor.detection * w.weather.detection_factor
         if sensor.detection_radius > 0.0:
+            shown = apparent_half_width(w, s)
             detection *= shown * shown / (shown * shown + sensor.detection_radius * sensor.detection_radius)
         if detection < 1.0 and rng.uniform(w.seed, stream_detection, pair_slot(w, o, s), tick) >= detection:
             continue
@@ -107,6 +110,7 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
         # the controller's side knows the measured range only
         t.measured[o, k, s, 3] = max(sensor.gain * hypot(dn, de), sensor.gain_floor)
         t.measured_us[o, k, s] = now
+        t.scan_found[o, k] += 1
     echo_land(w, land, o, k, sensor, reach, tick, count, stream_land, stream_land + 1)
     if w.clutter:
         false_alarms(w, o, k, sensor, reach, clutter, tick, stream_clutter)

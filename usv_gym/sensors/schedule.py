@@ -27,9 +27,10 @@ def _soonest_message(w, tick):
     soonest = NEVER
     for s in range(w.ais.next_tick.shape[0]):
         soonest = min(soonest, w.ais.next_tick[s])
-        for o in range(w.observer.shape[0]):
-            if w.ais.due_tick[o, s] > tick:
-                soonest = min(soonest, w.ais.due_tick[o, s])
+    for o in range(w.observer.shape[0]):
+        for s in range(w.ais.next_tick.shape[0]):
+            due = w.ais.due_tick[o, s]
+            soonest = min(soonest, due if due > tick else NEVER)
     return soonest
 
 

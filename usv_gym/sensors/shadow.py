@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from ..jit import inner
-from ..trig import PI, TWO_PI, atan2, wrap
+from ..trig import PI, TWO_PI, atan2, sincos, wrap
 from ..world.geometry import half_width
 
 
@@ -29,20 +29,29 @@ def look_around(w, own, reach):
     V, M = v.active.shape[0], m.active.shape[0]
     n0, e0 = v.eta[own, 0], v.eta[own, 1]
     reach2 = reach * reach
+    # squared distances first, without a branch, so that it becomes vector code: a LiDAR mostly looks at an empty sea
+    near = 0
+    for s in range(V):
+        dn, de = v.eta[s, 0] - n0, v.eta[s, 1] - e0
+        d2 = dn * dn + de * de if (v.active[s] != 0) & (s != own) else math.inf
+        w.ranges[s] = d2
+        near += d2 <= reach2
+    for i in range(M):
+        dn, de = m.position[i, 0] - n0, m.position[i, 1] - e0
+        d2 = dn * dn + de * de if m.active[i] != 0 else math.inf
+        w.ranges[V + i] = d2
+        near += d2 <= reach2
     count = 0
+    if near == 0:
+        return count
     for s in range(V + M):
+        if not w.ranges[s] <= reach2:
+            continue
         if s < V:
-            if v.active[s] == 0 or s == own:
-                continue
             dn, de = v.eta[s, 0] - n0, v.eta[s, 1] - e0
         else:
-            if m.active[s - V] == 0:
-                continue
             dn, de = m.position[s - V, 0] - n0, m.position[s - V, 1] - e0
-        d2 = dn * dn + de * de
-        if d2 > reach2:
-            continue
-        d = math.sqrt(d2)
+        d = math.sqrt(w.ranges[s])
         bearing = atan2(de, dn)
         if s < V:
             width = half_width(v.length[s], v.beam[s], bearing - v.eta[s, 2])
@@ -129,4 +138,5 @@ def cast_shadows(w, count):
 @inner
 def apparent_half_width(w, s):
     """Half the width [m] that source s shows, from what look_around() stored."""
-    return math.tan(w.half_angles[s]) * w.ranges[s] if w.half_angles[s] < 1.57 else np.inf
+    sine, cosine = sincos(w.half_angles[s])
+    return sine / cosine * w.ranges[s] if w.half_angles[s] < 1.57 else np.inf

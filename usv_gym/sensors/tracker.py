@@ -28,7 +28,7 @@ import math
 import numpy as np
 
 from ..jit import inner
-from ..trig import PI, atan2
+from ..trig import PI, atan2, exp
 from ..world.state import PHASE_MOTION, PHASE_POSITION
 from . import ekf, light
 from .motion import predict_motion, start_motion
@@ -157,8 +157,8 @@ def extend_line(start, h, n, e, f, scan):
     """Add a fix h [s] after the last one (weighted running moments, West 1979, with forgetting)."""
     if h <= 0.0:
         return
-    fade = math.exp(-h / MEMORY)
-    a = math.exp(-h / scan.bias_time[0])
+    fade = exp(-h / MEMORY)
+    a = exp(-h / scan.bias_time[0])
     bias = f * scan.bias[0]
     w = 1.0 / (ekf.white(f, scan.noise[0]) + bias * bias * (1.0 + a) / (1.0 - a))
     old = fade * start[3]

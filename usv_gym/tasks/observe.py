@@ -229,8 +229,8 @@ def _shade_sectors(obs, start, n, bearing, half, closeness):
     closeness = clip(closeness, 0.0, 1.0)
     if closeness == 0.0:
         return
-    first = int(math.floor((bearing - half) * (n / TWO_PI)))
-    more = int(math.floor((bearing + half) * (n / TWO_PI))) - first
+    first = math.floor((bearing - half) * (n / TWO_PI))
+    more = math.floor((bearing + half) * (n / TWO_PI)) - first
     i = first
     while i < 0:
         i += n

@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import rng
 from ..jit import inner
-from ..trig import atan2, clip, sincos
+from ..trig import atan2, clip, exp, sincos
 from ..units import DEG
 
 GRAVITY = 9.81  #: [m/s2]
@@ -168,7 +168,7 @@ def wave_step(w, p, j, tick):
     else:
         root = math.sqrt(1.0 - damping * damping)
         s, c = sincos(omega * root * h)
-        e = math.exp(-damping * omega * h)
+        e = exp(-damping * omega * h)
         s *= e / root
         c *= e
         a11 = c + damping * s

@@ -18,8 +18,8 @@ from .geometry import point_segment
 from .state import L
 
 # header of a block: corner of the grid N, E [m]; side of a cell [m]; rows (north), columns (east)
-# and, for what looks far around, the uncut edges in runs of RUN and groups of RUN runs: where the groups begin in the block, how
-# many; a group is the box (south, west, north, east) around it, the boxes around its runs, and their edges
+# and, for what looks far around, the uncut edges in runs of RUN and groups of RUN runs: where the groups begin in the block,
+# how many; a group is the box (south, west, north, east) around it, the boxes around its runs, and their edges
 CORNER_N, CORNER_E, SIDE, ROWS, COLUMNS, EDGES, GROUPS, CELLS = 0, 1, 2, 3, 4, 5, 6, 7
 RUN = 8
 RINGS = 3  #: in which it looks, each four times as far as the one before

@@ -356,6 +356,7 @@ def _tracks(O: int, S: int) -> Dtype:
         ("scan_bias_us", i8, (O, 2, S)),
         ("measured", f8, (O, 2, S, 4)),  # last raw measurement: N, E, radius, f(d)
         ("measured_us", i8, (O, 2, S)),
+        ("scan_found", i8, (O, 2)),  # how many measurements the last scan has
         ("scan_us", i8, (O, 2)), ("scan_due", i8, (O, 2)),  # stamp of the last scan; tick at which it arrives, -1: did
         ("visible", i1, (O, 2, S)),  # whether the last scan of that sensor could see the source (truth of the sensor)
         # echoes of land: nearest point N, E [m] {n} in each bearing sector, NaN for none; second axis of 2: the scan under
