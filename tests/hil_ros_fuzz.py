@@ -1,5 +1,10 @@
-"""Floods the bridge's topics over a real ROS with messages of the right type and the wrong content: ros1 or ros2, how many."""
+"""Floods the bridge's topics over a real ROS with messages of the right type and the wrong content: ros1 or ros2, how many.
 
+As fast as the bridge takes them: every message is handed over, so that the bridge has to have counted all of them.  Says as JSON
+how many there were of each topic, and where GNSS says that the ship is after all that.
+"""
+
+import json
 import math
 import random
 import sys
@@ -22,35 +27,73 @@ TEXTS = (
     "[",
     '{"waypoints": 1}',
 )
+place = []
 
 
 def number():
     return draw.choice(NUMBERS) if draw.random() < 0.7 else draw.uniform(-1e3, 1e3)
 
 
+def heard(message):
+    place[:] = message.latitude, message.longitude
+
+
 if which == "ros2":
     import rclpy
+    from rclpy.duration import Duration
+    from rclpy.qos import HistoryPolicy, QoSProfile
+    from rclpy.signals import SignalHandlerOptions
+    from sensor_msgs.msg import NavSatFix
     from std_msgs.msg import Float64
     from usv_gym_msgs.msg import Actuators, Command
 
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("fuzz")
-    topics = [(cls, node.create_publisher(cls, topic, 100)) for topic, cls in (
-        ("cmd/actuators", Actuators), ("hil/command", Command), ("thrusters/left/thrust", Float64))]  # fmt: skip
+    everything = QoSProfile(history=HistoryPolicy.KEEP_ALL)  # and reliable: it waits for a reader that is slow
+    names = {"cmd/actuators": Actuators, "hil/command": Command, "thrusters/left/thrust": Float64}
+    topics = {name: (cls, node.create_publisher(cls, name, everything)) for name, cls in names.items()}
+    node.create_subscription(NavSatFix, "sensors/gps/gps/fix", heard, 100)
+    resume = Command(command="resume"), "hil/command"
 
     def ready():
-        return all(publisher.get_subscription_count() for _, publisher in topics)
+        return all(publisher.get_subscription_count() for _, publisher in topics.values())
+
+    def publish(publisher, message):
+        while True:
+            try:
+                return publisher.publish(message)
+            except Exception as error:  # its history is full of what the bridge has not taken yet
+                if "publish" not in str(error):
+                    raise
+
+    def done():
+        assert all(publisher.wait_for_all_acked(Duration(seconds=60)) for _, publisher in topics.values())
+        until = time.monotonic() + 2.0
+        place.clear()
+        while time.monotonic() < until:
+            rclpy.spin_once(node, timeout_sec=0.1)
 else:
     import rospy
-    from simulator_messages.msg import ActuatorMessage, Environment, obstacleCmd
+    from simulator_messages.msg import ActuatorMessage, Environment, Gps, obstacleCmd
 
     rospy.init_node("fuzz", disable_rostime=True)
-    topics = [(cls, rospy.Publisher(topic, cls, queue_size=1000, tcp_nodelay=True)) for topic, cls in (
-        ("input/actuators", ActuatorMessage), ("/simObject/command", obstacleCmd),
-        ("input/environment_communication", Environment))]  # fmt: skip
+    names = {"input/actuators": ActuatorMessage, "/simObject/command": obstacleCmd,
+             "input/environment_communication": Environment}  # fmt: skip
+    # without a queue it waits until the bridge has taken a message
+    topics = {name: (cls, rospy.Publisher(name, cls, tcp_nodelay=True, queue_size=None)) for name, cls in names.items()}
+    rospy.Subscriber("sensors/gps", Gps, heard, queue_size=100)
+    resume = Environment(paused=False), "input/environment_communication"
 
     def ready():
-        return all(publisher.get_num_connections() for _, publisher in topics)
+        return all(publisher.get_num_connections() for _, publisher in topics.values())
+
+    def publish(publisher, message):
+        publisher.publish(message)
+
+    def done():
+        time.sleep(1.0)
+        place.clear()
+        time.sleep(1.0)
 
 
 def fill(message):
@@ -58,7 +101,7 @@ def fill(message):
     for name in names:
         value = getattr(message, name)
         if isinstance(value, bool):
-            setattr(message, name, False)
+            setattr(message, name, draw.random() < 0.5)
         elif isinstance(value, float):
             setattr(message, name, number())
         elif isinstance(value, str):
@@ -69,13 +112,21 @@ def fill(message):
 
 
 until = time.monotonic() + 30
-while not ready() and time.monotonic() < until:
+while not ready():
+    assert time.monotonic() < until, "nobody listens"
     time.sleep(0.05)
+sent = dict.fromkeys(topics, 0)
+began = time.monotonic()
 for k in range(count):
-    cls, publisher = draw.choice(topics)
-    publisher.publish(fill(cls()))
-    if k % 20 == 0:
-        time.sleep(0.004)  # a few thousand a second, which the transport can hold
-if which == "ros2":
-    topics[1][1].publish(Command(command="resume"))
-time.sleep(2.0)
+    name = draw.choice(list(topics))
+    cls, publisher = topics[name]
+    publish(publisher, fill(cls()))
+    sent[name] += 1
+    if k == count // 20:
+        print("warm", flush=True)
+message, name = resume
+sent[name] += 1
+publish(topics[name][1], message)
+took = time.monotonic() - began
+done()
+print(json.dumps({"sent": sent, "seconds": took, "place": place}), flush=True)

@@ -9,6 +9,7 @@ import random
 import re
 import shutil
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -317,6 +318,60 @@ def test_a_killed_controller_and_a_cut_wire_trip_the_fail_safe_and_control_comes
         forwarding.join()
         proxy.close()
         bridge.link.close()
+
+
+def test_a_lost_tcp_connection_trips_the_fail_safe_and_the_next_one_is_in_control():
+    """A client steers; its connection breaks (reset, not closed in order); another one comes and steers."""
+    bridge, backend = nmea_bridge(
+        control="heading_speed", tcp=True, duration=1e6, realtime=5.0, lock_step=False, interval=2
+    )
+    running = Background(bridge)
+    controller = bridge.controller
+    command = sentence("PUSVH,,10,8").encode() + b"\r\n"
+
+    def steer():
+        wire = socket.create_connection(backend.tcp)
+        next_line = lines_of(wire)
+        for _ in range(60):
+            next_line()
+            wire.sendall(command)
+        wait_until(lambda: not controller.failsafe and bridge.voyage.core.actions[0][1] > 0)
+        return wire
+
+    try:
+        for life in (1, 2):
+            wire = steer()
+            failsafes, began = controller.failsafes, bridge.t_us
+            wire.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            wire.close()
+            wait_until(lambda before=failsafes: controller.failsafes > before)
+            assert bridge.t_us - began < 1.6e6
+            wait_until(lambda: (bridge.voyage.core.actions[0] == [0.0, -1.0]).all())
+            wait_until(lambda: backend.peers() == 0)
+            assert life <= controller.failsafes
+    finally:
+        bridge.stop()
+        report = running.join()
+        bridge.link.close()
+    assert report.slips == 0
+
+
+def test_a_tcp_client_that_does_not_read_is_let_go_and_holds_nobody_up():
+    bridge, backend = nmea_bridge(tcp=True, duration=1e6, lock_step=False)
+    wire = socket.socket()
+    wire.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    wire.connect(backend.tcp)
+    wait_until(lambda: backend.peers() == 1)
+    ais = next(row for row in bridge.link.profile.rows if row.signal == "ais")
+    much = {"sentences": [sentence("AIVDM,1,1,,A," + "0" * 60 + ",0")] * 1000}
+    for _ in range(300):  # some 25 MB
+        backend.publish(ais, much)
+        bridge.step()
+        if not backend.peers():
+            break
+    assert backend.counters()["slow client dropped"] == 1
+    wire.close()
+    bridge.link.close()
 
 
 # --- gpsd ------------------------------------------------------------------------------------------------------------

@@ -173,50 +173,168 @@ class Lines:
             time.sleep(0.02)
 
 
-def test_ros1_survives_its_controller_and_its_master(ros1, tmp_path):
-    """Real time: the example controller is killed and started again; then the master is, and the controller once more."""
+class Duel:
+    """A bridge in real time against a controller that can be killed and stopped, over either ROS."""
+
+    def __init__(self, running, controller):
+        self.running, self.start = running, controller
+        self.said = Lines(running)
+        self.process, self.failures = None, 0
+
+    def begin(self):
+        self.process = self.start()
+        self.in_control()
+
+    def kill(self):
+        """Without a word: SIGKILL."""
+        self.process.kill()
+        self.process.wait()
+        self.lost()
+
+    def silence(self, seconds=0.0):
+        """The network between the two carries nothing: the controller stands still, its connections stay, nothing is said."""
+        self.process.send_signal(signal.SIGSTOP)
+        self.lost()
+        time.sleep(seconds)
+        self.process.send_signal(signal.SIGCONT)
+        self.in_control()
+
+    def lost(self):
+        self.failures += 1
+        self.said.wait("failsafe_on", self.failures)
+
+    def in_control(self):
+        self.said.wait("failsafe_off", self.failures)
+
+    def finish(self):
+        self.running.send_signal(signal.SIGINT)
+        assert self.running.wait(30) == 0
+
+    def close(self, *others):
+        for each in (self.process, *others, self.running):
+            if each is not None:
+                if each is self.process:
+                    each.send_signal(signal.SIGCONT)
+                end(each)
+        self.said.thread.join(5)
+        self.running.stdout.close()
+        print("".join(self.said.lines))
+
+
+def check_fail_safes(out, topic, failures, timeout=1.0):
+    """By the recording and the archive: thrust was off within the timeout after the last command, until the next one came."""
+    from test_hil_record import read
+
+    episode, topics = load(out / "episode.usv"), read(out / "run.mcap")
+    zero = np.zeros(7) if topic == "/input/actuators" else np.array([0.0, -1.0])
+    commands = np.array([stamp for stamp, _ in topics[topic]]) / 1e9
+    notices = [(stamp / 1e9, message.kind) for stamp, message in topics["/hil/notice"]]
+    began = [t for t, kind in notices if kind == "failsafe_on"]
+    ended = [t for t, kind in notices if kind == "failsafe_off"]
+    assert len(began) == len(ended) == failures
+    start = episode.meta["epoch_us"] / 1e6
+    dt = episode.meta["scenario"]["simulation"]["dt"]
+    acted = episode.t[: len(episode.actions)]
+    off = np.all(np.abs(episode.actions - zero) < 1e-12, axis=1)
+    for on, back in zip(began[1:], ended[1:], strict=True):  # before the first one nobody had spoken
+        before = commands[commands < on]
+        late = on - before[-1] - timeout
+        assert 0.0 < late < 3.5 * dt, (on, before[-3:])  # heard, taken in, noticed and told: a tick each
+        assert off[(acted >= on - start + dt / 2) & (acted < back - start - 1.5 * dt)].all()
+        assert np.any(~off[acted > back - start])
+
+
+def test_ros1_survives_its_controller_its_network_and_its_master(ros1, tmp_path):
+    """Real time: the controller is killed and started again, then silent for a while; then the master is killed, and both."""
     ros1 = {**ros1, "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}"}
     control = {**ros1, "PYTHONPATH": ros1["CONTROL_PATH"]}
-
-    def controller():
-        return spawn("/usr/bin/python3", EXAMPLES / "ros1_controller.py", "--route", *ROUTE, env=control)
-
     master = start_master(ros1)
-    running = bridge(sys.executable, ros1, tmp_path, "--backend", "ros1", "--profile", "hilsim", "--realtime", "2")
-    said = Lines(running)
-    process = None
+    duel = Duel(
+        bridge(sys.executable, ros1, tmp_path, "--backend", "ros1", "--profile", "hilsim", "--realtime", "2"),
+        lambda: spawn("/usr/bin/python3", EXAMPLES / "ros1_controller.py", "--route", *ROUTE, env=control),
+    )
     try:
-        said.wait("failsafe_on")  # nobody is there yet
-        process = controller()
-        said.wait("failsafe_off")
-        process.kill()
-        process.wait()
-        said.wait("failsafe_on", 2)
-        process = controller()
-        said.wait("failsafe_off", 2)
+        duel.lost()  # nobody is there yet
+        duel.begin()
+        duel.kill()
+        duel.begin()
+        duel.silence()
         end(master)
         time.sleep(1.2)  # connections stand without it
-        assert sum("failsafe_on" in line for line in said.lines) == 2
+        assert sum("failsafe_on" in line for line in duel.said.lines) == duel.failures
         master = start_master(ros1)
-        process.kill()
-        process.wait()
-        said.wait("failsafe_on", 3)
+        duel.kill()
         time.sleep(1.5)  # the bridge registers again
-        process = controller()
-        said.wait("failsafe_off", 3)
+        duel.begin()
+        duel.finish()
+    finally:
+        duel.close(master)
+    times = [float(line.split()[0][2:]) for line in duel.said.lines if line.startswith("t=") and "failsafe" in line]
+    assert times == sorted(times)
+    assert any("master was away 1" in line for line in duel.said.lines)
+    assert "episode.usv" in duel.said.lines[-1]  # Ctrl-C loses nothing
+
+
+# --- fuzz, over both -------------------------------------------------------------------------------------------------
+#: why the bridge does not take a message in; other counts are of what it had taken
+REFUSALS = ("not finite", "wrong type", "field missing", "not for us", "answers another step", "broken")
+
+
+def fuzz(fuzzer, environment, running, which, count):
+    """Flood a bridge with ``count`` messages: all of them are counted, memory does not grow, and the world goes on."""
+    said = Lines(running)
+
+    def resident():
+        """[bytes]"""
+        return int(Path(f"/proc/{running.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    flood = None
+    try:
+        said.wait("topics out")
+        flood = spawn(*fuzzer, TESTS / "hil_ros_fuzz.py", which, count, env=environment, stdout=subprocess.PIPE, text=True)
+        assert flood.stdout.readline() == "warm\n"
+        before = resident()
+        told = json.loads(flood.stdout.read())
+        assert flood.wait(30) == 0
+        grown = resident() - before
         running.send_signal(signal.SIGINT)
         assert running.wait(30) == 0
     finally:
-        for each in (process, master, running):
+        for each in (flood, running):
             if each is not None:
                 end(each)
+                each.stdout.close() if each is flood else None
         said.thread.join(5)
         running.stdout.close()
-    print("".join(said.lines))
-    times = [float(line.split()[0][2:]) for line in said.lines if line.startswith("t=") and "failsafe" in line]
-    assert times == sorted(times)
-    assert any("master was away 1" in line for line in said.lines)
-    assert "episode.usv" in said.lines[-1]  # Ctrl-C loses nothing
+    report = {line.partition(": ")[0]: line.partition(": ")[2] for line in said.lines}
+    print(*said.lines[-6:], told, f"{grown / 1e6:.1f} MB more", sep="\n")
+    received = {name: int(n) for name, n in re.findall(r"(\S+) (\d+)", report["received"])}
+    refused = {name.strip(): int(n) for name, n in re.findall(r"([a-zA-Z: ]+?) (\d+)", report["refused"])}
+    refusals = sum(n for name, n in refused.items() if name.startswith(REFUSALS))
+    assert sum(received.values()) + refusals == sum(told["sent"].values()) == count + 1
+    assert min(sum(received.values()), refusals) > count / 10
+    assert grown < 40e6
+    assert abs(told["place"][0] - 59.44) < 1.0
+    assert abs(told["place"][1] - 10.47) < 1.0
+
+
+COUNTS = [3000, pytest.param(100_000, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_fuzzed_messages_over_ros1_are_all_counted(ros1, tmp_path, count):
+    control = {**ros1, "PYTHONPATH": ros1["CONTROL_PATH"]}
+    running = spawn(sys.executable, "-m", "usv_gym.cli", "hil", "calm_crossing", "--backend", "ros1", "--profile", "hilsim",
+                    env=ros1, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)  # fmt: skip
+    fuzz(["/usr/bin/python3"], control, running, "ros1", count)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_fuzzed_messages_over_ros2_are_all_counted(ros2, tmp_path, count):
+    python, environment = ros2
+    running = spawn(python, "-m", "usv_gym.cli", "hil", "calm_crossing", "--backend", "ros2", env=environment,
+                    stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)  # fmt: skip
+    fuzz([python], environment, running, "ros2", count)
 
 
 @pytest.mark.slow
@@ -278,6 +396,31 @@ def test_ros2_lock_step_is_the_plain_environment_bit_for_bit(ros2, tmp_path):
     print(text)
     check_lock_step(tmp_path)
     assert median_round_trip(text) < 20.0  # 5 ms on a quiet machine (benchmarks/hil.py)
+
+
+def ros2_duel(python, environment, out, *more):
+    """A bridge and the example controller that can be killed."""
+    return Duel(
+        bridge(python, environment, out, "--backend", "ros2", "--control", "heading_speed", "--realtime", "2",
+               "--record", out / "run.mcap", *more),
+        lambda: spawn(python, EXAMPLES / "ros2_controller.py", "--route", *ROUTE, env=environment),
+    )  # fmt: skip
+
+
+def test_ros2_survives_its_controller_and_its_network(ros2, tmp_path):
+    """Real time: the controller is killed without a goodbye and started again; then nothing comes from it for a while."""
+    duel = ros2_duel(*ros2, tmp_path)
+    try:
+        duel.lost()  # nobody is there yet
+        duel.begin()
+        duel.kill()
+        duel.begin()
+        duel.silence()
+        duel.finish()
+    finally:
+        duel.close()
+    check_fail_safes(tmp_path, "/cmd/heading_speed", duel.failures)
+    assert "episode.usv" in duel.said.lines[-1]
 
 
 def test_ros2_example_avoids_the_crossing_ship_and_a_bare_dds_peer_reads_along(ros2, tmp_path):

@@ -17,7 +17,7 @@ from .ros import fill, read
 
 _TIME = ("secs", "nsecs")
 DEBIAN = "/usr/lib/python3/dist-packages"  #: where Debian's packages put rospy
-DEPTH = 100
+DEPTH = 100  #: messages that wait for a slow subscriber
 _DEFINITIONS = (Path("/usr/share"), Path("/opt/ros/noetic/share"))  #: PACKAGE/msg/TYPE.msg
 
 
@@ -62,8 +62,9 @@ class Ros1:
             publisher = rospy.Publisher(self._topic(row), classes[row], queue_size=DEPTH, tcp_nodelay=True)
             self._publishers[row] = publisher, classes[row]
         for row in incoming:
+            # without a queue nothing is dropped in silence: what is not read yet waits in the sender's socket
             self._subscribers.append(rospy.Subscriber(
-                self._topic(row), classes[row], self._callback(row, receive), queue_size=DEPTH, tcp_nodelay=True))  # fmt: skip
+                self._topic(row), classes[row], self._callback(row, receive), queue_size=None, tcp_nodelay=True))  # fmt: skip
 
         self._watcher = threading.Thread(target=self._watch, name="usv_gym master", daemon=True)
         self._watcher.start()
