@@ -1,7 +1,8 @@
 """Floods the bridge's topics over a real ROS with messages of the right type and the wrong content: ros1 or ros2, how many.
 
-As fast as the bridge takes them: every message is handed over, so that the bridge has to have counted all of them.  Says as JSON
-how many there were of each topic, and where GNSS says that the ship is after all that.
+Every message is handed over to the transport, so that the bridge has to have counted all of them.  In ROS 1 the sender waits for
+the bridge; in ROS 2 four of five come at a rate that its queues hold, and the rest all at once, which they do not.  Says as JSON how
+many there were of each topic, and where GNSS says that the ship is after all that.
 """
 
 import json
@@ -49,7 +50,7 @@ if which == "ros2":
 
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("fuzz")
-    everything = QoSProfile(history=HistoryPolicy.KEEP_ALL)  # and reliable: it waits for a reader that is slow
+    everything = QoSProfile(history=HistoryPolicy.KEEP_ALL)  # and reliable: nothing is lost on this side
     names = {"cmd/actuators": Actuators, "hil/command": Command, "thrusters/left/thrust": Float64}
     topics = {name: (cls, node.create_publisher(cls, name, everything)) for name, cls in names.items()}
     node.create_subscription(NavSatFix, "sensors/gps/gps/fix", heard, 100)
@@ -68,8 +69,7 @@ if which == "ros2":
 
     def done():
         assert all(publisher.wait_for_all_acked(Duration(seconds=60)) for _, publisher in topics.values())
-        until = time.monotonic() + 2.0
-        place.clear()
+        until = time.monotonic() + 1.0
         while time.monotonic() < until:
             rclpy.spin_once(node, timeout_sec=0.1)
 else:
@@ -91,8 +91,6 @@ else:
         publisher.publish(message)
 
     def done():
-        time.sleep(1.0)
-        place.clear()
         time.sleep(1.0)
 
 
@@ -122,6 +120,8 @@ for k in range(count):
     cls, publisher = topics[name]
     publish(publisher, fill(cls()))
     sent[name] += 1
+    if which == "ros2" and k % 20 == 0 and k < 0.8 * count:
+        time.sleep(0.01)
     if k == count // 20:
         print("warm", flush=True)
 message, name = resume

@@ -16,7 +16,8 @@ from .ros import fill, read
 
 _TIME = ("sec", "nanosec")
 DEPTH = 100  #: messages of a queue; ten are too few when a machine stalls
-DEPTH_IN = 1000  #: of those that come in: what does not fit gets lost without a word
+DEPTH_IN = 1000  #: of those that come in
+SENDERS = 256  #: whose numbers are remembered
 
 
 class Ros2:
@@ -30,6 +31,7 @@ class Ros2:
         """Nothing is imported yet."""
         self._name, self._namespace = node, namespace
         self._counters: Counter[str] = Counter()
+        self._numbers: dict[tuple[Row, bytes], int] = {}  # the last one of each sender
         self._node: Any = None
 
     def open(self, out: Sequence[Row], incoming: Sequence[Row], receive: Receive) -> None:
@@ -37,7 +39,7 @@ class Ros2:
         try:
             import rclpy
             from rclpy.executors import SingleThreadedExecutor
-            from rclpy.qos import QoSProfile
+            from rclpy.qos import QoSProfile, ReliabilityPolicy
             from rclpy.signals import SignalHandlerOptions
         except ImportError as error:
             raise ConfigError(
@@ -48,14 +50,17 @@ class Ros2:
         self._context = rclpy.Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node(self._name, context=self._context, namespace=self._namespace or None)
-        qos = QoSProfile(depth=DEPTH)
+        kept = QoSProfile(depth=DEPTH)
         self._publishers: dict[Row, tuple[Any, Any]] = {}
         for row in out:
             if (cls := classes[row]) is not None:
-                self._publishers[row] = self._node.create_publisher(cls, row.topic, qos), cls
+                self._publishers[row] = self._node.create_publisher(cls, row.topic, kept), cls
         for row in incoming:
             if (cls := classes[row]) is not None:
-                self._node.create_subscription(cls, row.topic, self._callback(row, receive), QoSProfile(depth=DEPTH_IN))
+                # where the boat is may come from a driver of a sensor, which often offers best effort only
+                best = ReliabilityPolicy.BEST_EFFORT if row.command == "own_pose" else ReliabilityPolicy.RELIABLE
+                qos = QoSProfile(depth=DEPTH_IN, reliability=best)
+                self._node.create_subscription(cls, row.topic, self._callback(row, receive), qos)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="usv_gym ros2", daemon=True)
@@ -78,7 +83,8 @@ class Ros2:
             return None
 
     def _callback(self, row: Row, receive: Receive) -> Any:
-        def heard(message: Any) -> None:
+        def heard(message: Any, info: Mapping[str, Any]) -> None:
+            self._count_lost(row, info)
             try:
                 values = read(message, message.get_fields_and_field_types(), _TIME)
             except Exception as error:  # nothing that comes in may stop the executor
@@ -87,6 +93,19 @@ class Ros2:
             receive(row, values)
 
         return heard
+
+    def _count_lost(self, row: Row, info: Mapping[str, Any]) -> None:
+        """What a sender's or our own queue has dropped leaves a gap in the sender's numbers."""
+        number, sender = info.get("publication_sequence_number"), info.get("publisher_gid")
+        if number is None or sender is None:
+            return
+        key = row, bytes(sender["data"])
+        last = self._numbers.pop(key, None)
+        if last is not None and number > last + 1:
+            self._counters[f"lost on the way: {row.topic}"] += number - last - 1
+        self._numbers[key] = number
+        if len(self._numbers) > SENDERS:
+            del self._numbers[next(iter(self._numbers))]  # that has been silent for longest
 
     def _spin(self) -> None:
         from rclpy.executors import ExternalShutdownException
