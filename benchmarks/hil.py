@@ -4,9 +4,9 @@
     python benchmarks/hil.py --seconds 60 --transports nmea ros1 ros2
     python benchmarks/hil.py --round-trips       # lock-step, 2000 steps over each transport
 
-Mean rates and drift are those that a listener in a process of its own measured (memory: a function of the same process), lateness
-is the bridge's own.  NMEA has no sentence for an IMU; its rate of turn goes at 100 Hz instead.  ROS needs what ros/ros1_apt.sh and
-ros/ros2_venv.sh (in .ros2, or USV_GYM_ROS2) leave.  Writes results/hil.json after each transport.
+Mean rates and drift are those that a listener in a process of its own measured (memory: a function of the same process);
+lateness is the bridge's own.  NMEA has no sentence for an IMU; its rate of turn goes at 100 Hz instead.  ROS needs what
+ros/ros1_apt.sh and ros/ros2_venv.sh (in .ros2, or USV_GYM_ROS2) leave.  Writes results/hil.json after each transport.
 """
 
 from __future__ import annotations

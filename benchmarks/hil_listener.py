@@ -5,12 +5,13 @@
 Imports nothing of usv_gym, and runs until it is ended.  ``rates`` is also what the benchmark says of its own process.
 """
 
+import itertools
 import json
+import os
 import signal
 import socket
 import sys
 import time
-
 
 SETTLED = 5.0  #: [s] after the first message from which arrivals count: connections come one after the other
 
@@ -25,7 +26,7 @@ def rates(arrivals, nominal):
     arrivals = [t for t in arrivals if t > arrivals[0] + SETTLED]
     if len(arrivals) < 20:
         return {"messages": len(arrivals)}
-    gaps = [1e3 * (b - a) for a, b in zip(arrivals, arrivals[1:], strict=False)]
+    gaps = [1e3 * (b - a) for a, b in itertools.pairwise(arrivals)]
     rate = (len(arrivals) - 1) / (arrivals[-1] - arrivals[0])
     offsets = [t - k / nominal for k, t in enumerate(arrivals)]
     tenth = len(offsets) // 10
@@ -43,9 +44,6 @@ def main():
     def ended(*_):
         with open(out, "w") as file:
             json.dump({"imu": rates(imu, 100.0), "gnss": rates(gnss, 20.0)}, file)
-        sys.stdout.flush()
-        import os
-
         os._exit(0)
 
     def heard_imu(_=None):

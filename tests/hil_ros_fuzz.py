@@ -1,8 +1,8 @@
 """Floods the bridge's topics over a real ROS with messages of the right type and the wrong content: ros1 or ros2, how many.
 
-Every message is handed over to the transport, so that the bridge has to have counted all of them.  In ROS 1 the sender waits for
-the bridge; in ROS 2 four of five come at a rate that its queues hold, and the rest all at once, which they do not.  Says as JSON how
-many there were of each topic, and where GNSS says that the ship is after all that.
+Every message is handed over to the transport, so that the bridge has to have counted all of them.  In ROS 1 the sender waits
+for the bridge; in ROS 2 four of five come at a rate that its queues hold, and the rest all at once, which they do not.  Says as
+JSON how many there were of each topic, and where GNSS says that the ship is after all that.
 """
 
 import json

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import os
 import random
 import re
 import shutil
@@ -14,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pyais
@@ -258,6 +260,41 @@ start: {sys.executable} {EXAMPLES}/nmea_controller.py {wires} --route {" ".join(
         rig.close()
 
 
+def test_the_own_ship_is_another_simulator_that_speaks_nmea():
+    """One bridge has the dynamics and nothing else; another has the surroundings, and hears by RMC, HDT and ROT where it is."""
+    surroundings = make_backend("nmea", {"listen": "127.0.0.1:0", "to": f"127.0.0.1:{free_port()}"})
+    link = Link(load_profile("nmea"), [surroundings], external=True)
+    around = Bridge(plan_hil("calm_crossing", duration=1e6, own_ship="external"), link,
+                    ExternalController(link, lock_step=False), realtime=5.0, own_ship="external", record=True)  # fmt: skip
+    link.open()
+    dynamics = make_backend("nmea", {"listen": "127.0.0.1:0", "to": f"127.0.0.1:{surroundings.listen[1]}"})
+    link = Link(load_profile("nmea"), [dynamics])
+    ship = Bridge(plan_hil("calm_crossing", duration=1e6, own_ship="only"), link, ExternalController(link, lock_step=False),
+                  realtime=5.0, own_ship="only", record=True)  # fmt: skip
+    link.open()
+    runs = [Background(around), Background(ship)]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
+        until = time.monotonic() + 2.0
+        while time.monotonic() < until:
+            wire.sendto(sentence("PUSVH,,40,8").encode(), dynamics.listen)
+            time.sleep(0.05)
+    for bridge, run in zip((around, ship), runs, strict=True):
+        bridge.stop()
+        run.join()
+        bridge.link.close()
+    there, here = around.voyage.finish(), ship.voyage.finish()
+    assert set(around.link.received) == {"OWN_RMC", "OWN_HDT", "OWN_ROT"}
+    moved = here.eta[-1, 0]
+    assert np.hypot(*moved[:2]) > 20.0
+    assert math.cos(moved[2] - 40 * DEG) > 0.99
+    late = there.eta[len(there.eta) // 2 :, 0]
+    apart = np.hypot(*(late[:, None, :2] - here.eta[None, :, 0, :2]).transpose(2, 0, 1)).min(axis=1)
+    assert np.median(apart) < 3.0  # what GNSS is off by
+    assert math.cos(late[-1, 2] - moved[2]) > 0.99
+    assert around.link.sent["TTM"] > 10
+    assert around.link.sent["AIS"] > 3
+
+
 # --- things that die -------------------------------------------------------------------------------------------------
 def wait_until(condition, seconds=20.0):
     until = time.monotonic() + seconds
@@ -372,6 +409,27 @@ def test_a_tcp_client_that_does_not_read_is_let_go_and_holds_nobody_up():
     assert backend.counters()["slow client dropped"] == 1
     wire.close()
     bridge.link.close()
+
+
+def test_a_controller_ends_with_the_process_that_started_it_even_if_that_is_killed():
+    """A campaign kills its workers; a controller that stayed would keep the wire."""
+    if sys.platform != "linux":
+        pytest.skip("only Linux tells a child")
+    code = "import time; from usv_gym.hil.rig import Process as P; print(P('sleep 600').child.pid, flush=True); time.sleep(600)"
+    parent = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    child = int(parent.stdout.readline())
+    os.kill(child, 0)
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+
+    def gone():
+        try:
+            return Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        except OSError:
+            return True
+
+    wait_until(gone, seconds=5.0)
 
 
 # --- gpsd ------------------------------------------------------------------------------------------------------------

@@ -289,7 +289,8 @@ class Fuzz:
         self.running = spawn(python, "-m", "usv_gym.cli", "hil", "calm_crossing", "--backend", which, *more, env=environment,
                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)  # fmt: skip
         self.said = Lines(self.running)
-        self.flood = spawn(peer, TESTS / "hil_ros_fuzz.py", which, count, env=peer_environment, stdout=subprocess.PIPE, text=True)
+        self.flood = spawn(peer, TESTS / "hil_ros_fuzz.py", which, count, env=peer_environment, stdout=subprocess.PIPE,
+                           text=True)  # fmt: skip
 
     def resident(self):
         """[bytes]"""
@@ -328,12 +329,14 @@ class Fuzz:
         self.running.stdout.close()
 
 
-@pytest.mark.parametrize("count", [3000, pytest.param(100_000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("which", ["ros1", "ros2"])
+@pytest.mark.parametrize(
+    ("which", "count"), [("ros1", 100_000), ("ros2", 3000), pytest.param("ros2", 100_000, marks=pytest.mark.slow)]
+)
 def test_fuzzed_messages_over_ros_are_all_counted(which, count, request):
     if which == "ros1":
         environment = request.getfixturevalue("ros1")
-        python, peer, peer_environment = sys.executable, "/usr/bin/python3", {**environment, "PYTHONPATH": environment["CONTROL_PATH"]}
+        python, peer = sys.executable, "/usr/bin/python3"
+        peer_environment = {**environment, "PYTHONPATH": environment["CONTROL_PATH"]}
     else:
         python, environment = request.getfixturevalue("ros2")
         peer, peer_environment = python, environment

@@ -9,7 +9,8 @@ import atexit
 import os
 import shlex
 import subprocess
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -82,6 +83,17 @@ def make_controller(
                               interval=interval, must_answer=must_answer)  # fmt: skip
 
 
+def _dies_with_us() -> Callable[[], object] | None:
+    """What makes a child end when we are killed, as a campaign does with its workers: else it would stay, and keep the wire."""
+    if sys.platform != "linux":
+        return None
+    import ctypes
+    import signal
+
+    prctl = ctypes.CDLL(None).prctl  # found here: between fork and exec nothing may be loaded
+    return lambda: prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+
+
 class Process:
     """A controller that runs beside the bridge, in an environment of its own."""
 
@@ -90,7 +102,7 @@ class Process:
         environment = {key: value for key, value in os.environ.items()
                        if key not in ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")}  # fmt: skip  # of wheels of ROS 2
         try:
-            self.child = subprocess.Popen(shlex.split(command), cwd=directory, env=environment)
+            self.child = subprocess.Popen(shlex.split(command), cwd=directory, env=environment, preexec_fn=_dies_with_us())
         except (OSError, ValueError) as error:
             raise ConfigError(f"start {command!r}: {getattr(error, 'strerror', None) or error}") from None
         atexit.register(self.end)
