@@ -343,6 +343,120 @@ def test_fuzzed_messages_over_ros_are_all_counted(which, count, request):
     Fuzz(which, python, environment, peer, peer_environment, count).check()
 
 
+# --- the network -----------------------------------------------------------------------------------------------------
+@pytest.fixture
+def cable():
+    """A network of two ends on this machine: (address here, address there, what runs a command there, what pulls the cable)."""
+    if os.geteuid() != 0 or shutil.which("ip") is None:
+        pytest.skip("needs root and iproute2")
+    name = f"usv{os.getpid() % 10000}"
+    here, there = (f"10.213.{os.getpid() % 250}.{end}" for end in (1, 2))
+
+    def ip(*arguments, check=True):
+        subprocess.run(["ip", *arguments], check=check, capture_output=True)
+
+    try:
+        ip("netns", "add", name)
+        ip("link", "add", name, "type", "veth", "peer", "name", "sea", "netns", name)
+        ip("addr", "add", f"{here}/24", "dev", name)
+        ip("-n", name, "addr", "add", f"{there}/24", "dev", "sea")
+        ip("link", "set", name, "up")
+        for device in ("sea", "lo"):
+            ip("-n", name, "link", "set", device, "up")
+    except subprocess.CalledProcessError as error:
+        ip("netns", "delete", name, check=False)
+        pytest.skip(f"no network of its own: {error.stderr.decode().strip()}")
+    yield here, there, ["ip", "netns", "exec", name], lambda state: ip("link", "set", name, state)
+    ip("link", "delete", name)
+    ip("netns", "delete", name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seconds", [3.0, 25.0], ids=["short", "longer than a lease"])
+@pytest.mark.parametrize("transport", ["nmea", "ros1", "ros2"])
+def test_a_pulled_cable_trips_the_fail_safe_and_control_comes_back(transport, seconds, cable, request, tmp_path):
+    """Bridge and controller are on two ends of a network that is cut in between; nothing is started again."""
+    here, there, run_there, pull = cable
+    python, environment, control, master = sys.executable, {}, {}, None
+    if transport == "nmea":
+        options = ["-o", f"to={there}:10110", "-o", f"listen={here}:10111"]
+        controller = [python, EXAMPLES / "nmea_controller.py", "--listen", f"{there}:10110", "--to", f"{here}:10111"]
+    elif transport == "ros1":
+        graph = request.getfixturevalue("ros1")
+        environment = {**graph, "ROS_IP": here, "ROS_MASTER_URI": f"http://{here}:{free_port()}"}
+        control = {**environment, "ROS_IP": there, "PYTHONPATH": graph["CONTROL_PATH"]}
+        options, controller = ["--profile", "hilsim"], ["/usr/bin/python3", EXAMPLES / "ros1_controller.py"]
+        master = start_master(environment)
+    else:
+        python, environment = request.getfixturevalue("ros2")
+        environment = {**environment, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "FASTDDS_DEFAULT_PROFILES_FILE": "",
+                       "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}  # fmt: skip
+        control, options, controller = environment, ["--control", "heading_speed"], [python, EXAMPLES / "ros2_controller.py"]
+    duel = Duel(bridge(python, environment, tmp_path, "--backend", transport, *options),
+                lambda: spawn(*run_there, *controller, "--route", *ROUTE, env=control))  # fmt: skip
+    try:
+        duel.lost()
+        duel.begin()
+        pull("down")
+        duel.lost()
+        time.sleep(seconds)
+        pull("up")
+        duel.in_control()
+        duel.finish()
+    finally:
+        duel.close(master)
+
+
+# --- what starts them -----------------------------------------------------------------------------------------------
+@pytest.mark.slow
+def test_roslaunch_starts_the_bridge_as_a_node(ros1, tmp_path):
+    """The launch file as docs/hil.md has it, without RViz; and a controller beside it."""
+    roslaunch = shutil.which("roslaunch", path="/usr/bin:/opt/ros/noetic/bin")
+    if roslaunch is None:
+        pytest.skip("needs python3-roslaunch")
+    (tmp_path / "usv-gym").write_text(f'#!/bin/sh\nexec {sys.executable} -m usv_gym.cli "$@"\n')
+    (tmp_path / "usv-gym").chmod(0o755)
+    settings = {**ros1, "ROS_PACKAGE_PATH": str(ROOT / "ros"), "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    launch = spawn(roslaunch, ROOT / "ros" / "launch" / "usv_gym.launch", "rviz:=false", "more:=--duration 12", env=settings,
+                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)  # fmt: skip
+    control = {**ros1, "PYTHONPATH": ros1["CONTROL_PATH"]}
+    controller = spawn("/usr/bin/python3", EXAMPLES / "ros1_controller.py", "--route", *ROUTE, env=control)
+    try:
+        text, _ = launch.communicate(timeout=90)
+    finally:
+        end(controller)
+        end(launch)
+    assert launch.returncode == 0, text
+    assert "240 steps, 12.00 s simulated" in text
+    assert int(re.search(r"received: input/actuators (\d+)", text)[1]) > 50
+
+
+@pytest.mark.parametrize("name", ["ros1", "ros2"])
+def test_compose_files_name_what_is_there(name):
+    """Every path of the project in a compose file exists, and its `usv-gym hil` is one that the command line takes."""
+    import yaml
+    from typer.testing import CliRunner
+
+    from usv_gym.cli.app import app
+    from usv_gym.hil import serve
+
+    services = yaml.safe_load((ROOT / "ros" / "compose" / f"{name}.yaml").read_text())["services"]
+    assert {"bridge", "controller"} <= set(services)
+    for service in services.values():
+        (mount,) = (volume for volume in service["volumes"] if volume.startswith("../.."))
+        assert mount == "../..:/usv_gym:ro"
+        script = service["command"][-1]
+        for path in re.findall(r"/usv_gym(/[\w./]+)", script):
+            assert (ROOT / path[1:]).exists(), path
+    started = {}
+    line = re.search(r"usv-gym (hil .*)", services["bridge"]["command"][-1])[1].replace("/build/", "")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(serve, "serve", lambda mission, rig, **more: started.update(rig=rig, **more))
+        done = CliRunner().invoke(app, line.split())
+    assert done.exit_code == 0, done.output
+    assert started["rig"].backend == name
+
+
 @pytest.mark.slow
 def test_rviz_shows_the_markers(ros1, tmp_path):
     """Under a virtual display: obstacles, ships, detections, track and thrust are on the screen."""
