@@ -7,6 +7,8 @@ import socket
 import subprocess
 import sys
 import threading
+import time
+import xmlrpc.client
 from pathlib import Path
 
 from hil_demand import demand
@@ -19,6 +21,7 @@ from usv_gym.hil.link import Link
 from usv_gym.hil.profile import load_profile
 
 ROOT = Path(__file__).parents[1]
+TESTS = Path(__file__).parent
 EXAMPLES = ROOT / "examples" / "hil"
 #: {n} of calm_crossing's waypoints: [250, 0] and [500, 60]
 ROUTE = ("59.440019,10.471651", "59.442263,10.472709")
@@ -117,3 +120,58 @@ def end(process):
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+
+
+# --- ROS -------------------------------------------------------------------------------------------------------------
+def start_master(environment):
+    port = environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
+    master = spawn(
+        "/usr/bin/rosmaster",
+        "--core",
+        "-p",
+        port,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    until = time.monotonic() + 15
+    while True:
+        try:
+            with xmlrpc.client.ServerProxy(environment["ROS_MASTER_URI"]) as proxy:
+                proxy.getPid("/test")
+            return master
+        except OSError:
+            assert time.monotonic() < until, "the master does not start"
+            time.sleep(0.05)
+
+
+def bridge(python, environment, out, *arguments, **kwargs):
+    """`usv-gym hil` as a process."""
+    return spawn(python, "-m", "usv_gym.cli", "hil", "calm_crossing", "--out", out, *arguments,
+                 env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **kwargs)  # fmt: skip
+
+
+def finish(process, timeout=90):
+    text, _ = process.communicate(timeout=timeout)
+    assert process.returncode == 0, text
+    return text
+
+
+class Lines:
+    """What a process says, line by line."""
+
+    def __init__(self, process):
+        self.process, self.lines = process, []
+        self.thread = threading.Thread(target=self._read, daemon=True)
+        self.thread.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line)
+
+    def wait(self, text, count=1, seconds=60.0):
+        until = time.monotonic() + seconds
+        while sum(text in line for line in self.lines) < count:
+            assert time.monotonic() < until, f"no {text!r} in {self.lines}"
+            assert self.process.poll() is None, self.lines
+            time.sleep(0.02)

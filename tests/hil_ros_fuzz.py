@@ -1,17 +1,18 @@
-"""Floods the bridge's topics over a real ROS with messages of the right type and the wrong content: ros1 or ros2, how many.
+"""Floods the bridge over a real ROS with messages of the right type and the wrong content: ros1 or ros2, how many, its pid.
 
 Every message is handed over to the transport, so that the bridge has to have counted all of them.  In ROS 1 the sender waits
 for the bridge; in ROS 2 four of five come at a rate that its queues hold, and the rest all at once, which they do not.  Says as
-JSON how many there were of each topic, and where GNSS says that the ship is after all that.
+JSON how many there were of each topic, what memory the bridge held before and after, and where GNSS then says that the ship is.
 """
 
 import json
 import math
+import os
 import random
 import sys
 import time
 
-which, count = sys.argv[1], int(sys.argv[2])
+which, count, bridge = sys.argv[1], int(sys.argv[2]), sys.argv[3]
 draw = random.Random(7)
 NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 0.0, -1.0, 1e9)
 TEXTS = (
@@ -33,6 +34,12 @@ place = []
 
 def number():
     return draw.choice(NUMBERS) if draw.random() < 0.7 else draw.uniform(-1e3, 1e3)
+
+
+def resident():
+    """Of the bridge [bytes]."""
+    with open(f"/proc/{bridge}/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def heard(message):
@@ -123,10 +130,11 @@ for k in range(count):
     if which == "ros2" and k % 20 == 0 and k < 0.8 * count:
         time.sleep(0.01)
     if k == count // 20:
-        print("warm", flush=True)
+        memory = [resident()]
 message, name = resume
 sent[name] += 1
 publish(topics[name][1], message)
 took = time.monotonic() - began
 done()
-print(json.dumps({"sent": sent, "seconds": took, "place": place}), flush=True)
+memory.append(resident())
+print(json.dumps({"sent": sent, "seconds": took, "memory": memory, "place": place}), flush=True)

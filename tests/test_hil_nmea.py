@@ -21,7 +21,7 @@ import numpy as np
 import pyais
 import pynmea2
 import pytest
-from hil_helpers import EXAMPLES, ROUTE, Background, end, example, expected, free_port, memory_bridge, plain_env, spawn
+from hil_helpers import EXAMPLES, ROUTE, Background, end, example, expected, free_port, plain_env, spawn
 
 from usv_gym.config import ConfigError
 from usv_gym.hil.backends import make_backend
@@ -33,12 +33,7 @@ from usv_gym.hil.link import Link
 from usv_gym.hil.profile import Row, load_profile
 from usv_gym.units import DEG, KNOT
 
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled():
-    """Kernels are on the disk before a process needs them within seconds."""
-    bridge, _, _ = memory_bridge()
-    bridge.step()
+pytestmark = pytest.mark.usefixtures("compiled")
 
 
 def nmea_bridge(
