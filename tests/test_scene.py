@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled
 
-from usv_gym.render import canvas, compose, shapes
+from usv_gym.render import canvas, compose, shapes, trace
 from usv_gym.render.labels import Request, place
 from usv_gym.render.palette import PALETTES, STYLES
 from usv_gym.render.primitives import Circle, Dots, Label, Polygon, Polyline
@@ -173,7 +173,12 @@ def test_target_table_by_hand():
     assert (fixed.id, fixed.type, fixed.sensors) == ("T09", "fixed", "RL")
     assert fixed.bearing == pytest.approx(math.degrees(math.atan2(-40.0, 100.0)) % 360.0)
     assert (fixed.cpa, fixed.tcpa) == (pytest.approx(40.0), pytest.approx(20.0))
-    assert (ship.id, ship.type, ship.encounter, ship.sensors) == ("T07", "vessel", "give way", "AR")  # it is to starboard
+    assert (ship.id, ship.type, ship.encounter, ship.sensors) == (
+        "T07",
+        "vessel",
+        "give way",
+        "AR",
+    )  # it is to starboard
     assert (ship.bearing, ship.range) == (pytest.approx(45.0), pytest.approx(300.0 * math.sqrt(2.0)))
     assert (ship.cpa, ship.tcpa) == (pytest.approx(0.0, abs=1e-6), pytest.approx(60.0))
 
@@ -340,6 +345,54 @@ def test_a_target_changes_the_picture_where_it_is():
     changed = (render(scene_from_snapshot(w), size, view=view) != before).any(axis=2)
     assert changed[200 - 20 : 200 + 20, 300 - 20 : 300 + 20].any()
     assert not changed[:, :100].any()
+
+
+def test_a_picture_does_not_depend_on_what_was_drawn_before():
+    first, other = scene_from_episode(an_episode()), scene_from_snapshot(a_world(200)[0])
+    once = render(first, (700, 500))
+    for size, palette in (((700, 500), "night"), ((500, 700), "dark"), ((700, 500), "dark")):
+        render(other, size, palette)
+    canvas.text_surface.cache_clear()
+    np.testing.assert_array_equal(render(first, (700, 500)), once)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_areas_are_filled_where_they_are(seed):
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:80, :90] + 0.5
+    centres = rng.integers(-10, 100, (12, 2)).astype(np.int32)
+    pixels = np.zeros((80, 90), np.uint32)
+    trace.flood(pixels, centres, np.array([0, 5, 12], np.int32), 13.0, np.uint32(7))
+    inside = np.hypot(x[..., None] - centres[:, 0], y[..., None] - centres[:, 1])
+    expected = (inside <= 13.0).any(axis=-1)
+    sure = (np.abs(inside - 13.0) > 0.01).all(axis=-1)
+    np.testing.assert_array_equal((pixels == 7)[sure], expected[sure])
+
+    corners = rng.integers(-30, 120, (9, 2)).astype(np.int32)  # three triangles, all over each other
+    triangles = corners.reshape(3, 3, 2, 1, 1).astype(float)
+    ahead = np.roll(triangles, -1, axis=1) - triangles
+    sides = ahead[:, :, 0] * (y - triangles[:, :, 1]) - ahead[:, :, 1] * (x - triangles[:, :, 0])  # [3, 3, 80, 90]
+    expected = (sides > 0.0).all(axis=1) | (sides < 0.0).all(axis=1)
+    sure = (np.abs(sides) > 1e-6).all(axis=(0, 1))  # no middle of a pixel on a side
+    pixels[:] = 0
+    trace.flood(pixels, corners, np.array([0, 3, 6, 9], np.int32), 0.0, np.uint32(7))
+    np.testing.assert_array_equal((pixels == 7)[sure], expected.any(axis=0)[sure])
+    pixels[:] = 0x204060
+    trace.blend(pixels, corners[:3], np.uint32(0xE0C0A0), 64)
+    assert set(np.unique(pixels)) <= {0x204060, 0x506070}  # a quarter of the way
+    np.testing.assert_array_equal((pixels == 0x506070)[sure], expected[0][sure])
+
+
+def test_an_outline_is_clipped_and_a_line_that_is_out_of_sight_is_left_out():
+    square = np.array([(-50.0, 10.0), (50.0, 10.0), (50.0, 90.0), (-50.0, 90.0)])
+    far = np.array([(200.0, 0.0), (300.0, 50.0)])
+    shapes, none = (square, far), np.zeros(2)
+    corners, start, *_ = trace.trace(
+        np.concatenate(shapes), np.array([0, 4, 6]), np.array([trace.AREA, trace.LINE]), none != 0, none != 0, none, none,
+        (0.0, 0.0, 100.0, 50.0), 2.0,
+    )  # fmt: skip
+    assert start.tolist() == [0, 4, 4]
+    assert {tuple(c) for c in corners.tolist()} == {(0, 20), (100, 20), (100, 100), (0, 100)}
 
 
 @pytest.mark.parametrize("size", [(64, 64), (84, 84), (300, 120), (1180, 400), (1600, 1200)])

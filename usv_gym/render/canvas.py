@@ -6,16 +6,17 @@ import functools
 import math
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
 
 from .palette import STYLES, Style
 from .primitives import Points
+from .trace import AREA, BEADS, DOTS, LINE, SPOTS, average, blend, flood, trace
 
 RGBA = tuple[int, int, int, int]
-Frame = tuple[float, float, float, float]  # left, top, right, bottom [px]
+FINE = 4  #: text is written this many times as large and made smaller
 
 
 @functools.cache
@@ -58,10 +59,10 @@ def font(size: int) -> Any:
 def text_surface(text: str, size: int, colour: str, halo: str = "") -> Any:
     """Rendered text, with an outline of one pixel in the colour ``halo``."""
     pg = load_pygame()
-    front = font(size).render(text, True, rgba(colour)[:3])  # type: ignore[index]
+    front = _written(text, size, colour)
     if not halo:
         return front
-    back = font(size).render(text, True, rgba(halo)[:3])  # type: ignore[index]
+    back = _written(text, size, halo)
     out = pg.Surface((front.get_width() + 2, front.get_height() + 2), pg.SRCALPHA)
     for dx, dy in ((0, 0), (2, 0), (0, 2), (2, 2), (1, 0), (0, 1), (2, 1), (1, 2)):
         out.blit(back, (dx, dy))
@@ -69,11 +70,17 @@ def text_surface(text: str, size: int, colour: str, halo: str = "") -> Any:
     return out
 
 
+def _written(text: str, size: int, colour: str) -> Any:
+    """Rendered text.  It is written large and made smaller, for small letters have room for whole pixels only between them."""
+    large = font(size * FINE).render(text, True, rgba(colour)[:3])  # type: ignore[index]
+    return load_pygame().transform.smoothscale(large, text_size(text, size))
+
+
 @functools.lru_cache(maxsize=4096)
 def text_size(text: str, size: int) -> tuple[int, int]:
     """Width and height of a text [px]."""
-    width, height = font(size).size(text)
-    return int(width), int(height)
+    width, height = font(size * FINE).size(text)
+    return max(math.ceil(width / FINE), 1), math.ceil(height / FINE)
 
 
 def fitting(text: str, room: float, size: int) -> str:
@@ -85,11 +92,30 @@ def fitting(text: str, room: float, size: int) -> str:
     return text + "…" if text else ""
 
 
+class Look(NamedTuple):
+    """How a role is drawn in a palette; None is not drawn."""
+
+    style: Style
+    fill: RGBA | None
+    tint: RGBA | None  # the opaque colour of the area over the bare sea
+    line: RGBA | None  # opaque too: thin decoration needs no true blending
+
+
 @functools.cache
-def look(role: str, palette: str) -> tuple[Style, RGBA | None, RGBA | None]:
-    """Style, area colour and line colour of a role."""
+def look(role: str, palette: str) -> Look:
+    """Style and colours of a role."""
     style = STYLES[role]
-    return style, rgba(style.fill(palette)), rgba(style.line(palette))
+    fill, line, sea = (rgba(c) for c in (style.fill(palette), style.line(palette), STYLES["sea"].fill(palette)))
+    return Look(style, fill, _over(fill, sea), _over(line, sea))
+
+
+def _over(colour: RGBA | None, ground: RGBA | None) -> RGBA | None:
+    """Opaque colour of a translucent one on a ground."""
+    if colour is None or ground is None:
+        return colour
+    k = colour[3] / 255.0
+    r, g, b = (round(k * c + (1.0 - k) * s) for c, s in zip(colour[:3], ground[:3], strict=True))
+    return r, g, b, 255
 
 
 @functools.cache
@@ -98,17 +124,39 @@ def _unit_circle(n: int) -> Points:
     return np.column_stack((np.cos(b), np.sin(b)))
 
 
-@functools.lru_cache(maxsize=64)
-def _ring(radius: float, on: float, off: float) -> Points:
-    """Dashes [n, 4] x, y, x, y of a circle about (0, 0): rings about the own ship are the same in every frame."""
-    n = max(round(2.0 * math.pi * radius / (on + off)), 6)
-    a = np.arange(n) * (2.0 * math.pi / n)
-    b = a + 2.0 * math.pi / n * on / (on + off)
-    return radius * np.column_stack((np.cos(a), np.sin(a), np.cos(b), np.sin(b)))
+_SPARE: list[Any] = []  # the last large surface: fresh memory costs more than a scene's shapes
+KEPT = 16_000_000  #: pixels; one larger is not kept
+
+
+def _spare(pg: Any, size: tuple[int, int]) -> Any:
+    """A surface of 32 bits with anything on it."""
+    try:
+        large = _SPARE.pop()  # nobody else has it now
+    except IndexError:
+        large = None
+    return large if large is not None and large.get_size() == size else pg.Surface(size, 0, 32)
+
+
+class _Shape(NamedTuple):
+    """Something to draw: its points as `trace` takes them, and what is done with the corners that come of them."""
+
+    kind: int
+    points: Points  # [n, 2] px
+    fill: RGBA | None = None
+    line: RGBA | None = None
+    width: int = 1  # of the line [pixels]
+    on: float = 0.0
+    off: float = 0.0
+    arrow: bool = False
+    radius: float = 0.0  # of discs or of a ring [pixels]
+    joints: bool = True  # whether bends are filled
+    together: int = 1  # shapes filled at once, of which this is the first; 0: a further one
 
 
 class Canvas:
     """A picture in the making.  Coordinates are px of 1/96 inch, which are pixels unless ``ratio`` says otherwise.
+
+    Shapes are only remembered; `finish` prepares them in one pass and draws them in their order, then the texts.
 
     Parameters
     ----------
@@ -120,20 +168,22 @@ class Canvas:
         shapes are drawn this many times as large and averaged.
     ratio
         pixels per px: 2 on a screen of high density.
+    ground
+        role whose colour fills it.
     """
 
-    def __init__(self, pixels: tuple[int, int], palette: str, supersample: int = 2, ratio: float = 1.0) -> None:
+    def __init__(
+        self, pixels: tuple[int, int], palette: str, supersample: int = 2, ratio: float = 1.0, ground: str = "panel"
+    ) -> None:
         """Blank picture."""
-        self.pixels, self.ratio, self.palette, self.ss = pixels, ratio, palette, supersample * ratio
+        self.ground = look(ground, palette).fill
+        self.pixels, self.ratio, self.palette, self.supersample = pixels, ratio, palette, supersample
+        self.ss = supersample * ratio
         self.size = size = (pixels[0] / ratio, pixels[1] / ratio)  # [px]
         self.frame = -20.0, -20.0, size[0] + 20.0, size[1] + 20.0  # what lies outside is out of sight
         self.pg = load_pygame()
-        self.surface = self.pg.Surface((pixels[0] * supersample, pixels[1] * supersample))
+        self._shapes: list[_Shape] = []
         self._text: list[tuple[Any, tuple[int, int]]] = []
-
-    def style(self, role: str) -> tuple[Style, RGBA | None, RGBA | None]:
-        """Style, area colour and line colour of a role."""
-        return look(role, self.palette)
 
     # --- shapes ------------------------------------------------------------------------------------------------------
     def box(self, box: Sequence[float], role: str, radius: float = 0.0) -> None:
@@ -143,83 +193,57 @@ class Canvas:
 
     def polygon(self, points: Points, role: str) -> None:
         """Filled outline [n, 2]."""
-        style, fill, line = self.style(role)
-        shape = clip(points, self.frame)  # its new edges lie out of sight
-        if len(shape) < 3:
-            return
-        if fill is not None:
-            self._fill(shape, fill)
-        if line is not None:
-            self._stroke(shape, line, style, closed=True)
+        style, fill, _, line = look(role, self.palette)
+        dashed = line is not None and style.dash is not None
+        if fill is not None or not dashed:
+            self._shapes.append(_Shape(AREA, points, fill, None if dashed else line, self._width(style)))
+        if dashed:
+            self.polyline(np.concatenate((points, points[:1])), role)
 
     def area(self, shell: Points, holes: Sequence[Points], role: str, hole_role: str) -> None:
-        """A large outline with holes in it; corners that fall on the same pixel are drawn once."""
-        style, fill, line = self.style(role)
-        for ring, colour in ((shell, fill), *((hole, self.style(hole_role)[1]) for hole in holes)):
-            corners = (_pixels(clip(ring, self.frame)) * self.ss).tolist()
-            if len(corners) < 3:
-                continue
-            if colour is not None:
-                self.pg.draw.polygon(self.surface, colour[:3], corners)
-            if line is not None:
-                self.pg.draw.lines(self.surface, line[:3], True, corners, self._width(style))
+        """A large outline with holes in it."""
+        style, fill, _, line = look(role, self.palette)
+        hole = look(hole_role, self.palette).fill
+        for ring, colour in ((shell, fill), *((ring, hole) for ring in holes)):
+            self._shapes.append(_Shape(AREA, ring, colour, line, self._width(style), joints=False))
 
-    def fringe(self, ring: Points, width: float, role: str) -> None:
-        """What lies within ``width`` of a closed outline: discs along it, near enough to look like one band."""
-        fill = self.style(role)[1]
-        if fill is None or width < 1.0:
-            return
-        line = np.vstack((ring, ring[:1]))
-        along = np.concatenate(((0.0,), np.hypot(*np.diff(line, axis=0).T).cumsum()))
-        at = np.arange(0.0, along[-1], 0.25 * width)[:20000]
-        centres = np.column_stack([np.interp(at, along, line[:, k]) for k in range(2)])
-        x0, y0, x1, y1 = self.frame
-        for x, y in (seen(centres, (x0 - width, y0 - width, x1 + width, y1 + width)) * self.ss).tolist():
-            self.pg.draw.circle(self.surface, fill[:3], (x, y), width * self.ss)
+    def fringe(self, rings: Sequence[Points], width: float, role: str) -> None:
+        """What lies within ``width`` of closed outlines: discs along them, near enough to look like one band."""
+        if width >= 1.0:
+            self._flood([_Shape(BEADS, r, on=0.15 * width, off=width, radius=width * self.ss) for r in rings], role)
+
+    def tint(self, outlines: Sequence[Points], role: str) -> None:
+        """Fill outlines as if their translucent colour lay on the bare sea: where two overlap it is no darker."""
+        self._flood([_Shape(AREA, outline) for outline in outlines], role)
+
+    def _flood(self, shapes: list[_Shape], role: str) -> None:
+        """Shapes to be filled together."""
+        colour = look(role, self.palette).tint
+        if shapes and colour is not None:
+            self._shapes.append(shapes[0]._replace(fill=colour, together=len(shapes)))
+            self._shapes += [shape._replace(together=0) for shape in shapes[1:]]
 
     def polyline(self, points: Points, role: str, arrow: bool = False) -> None:
         """Line through points [n, 2]."""
-        style, _, line = self.style(role)
-        if line is None or len(points) < 2 or _where(points, self.frame) == OUTSIDE:
-            return
-        if arrow:
-            points = self._arrow(points, line)
-        self._stroke(points, line, style)
+        style, _, _, line = look(role, self.palette)
+        if line is not None and len(points) > 1:
+            on, off = style.dash or (0.0, 0.0)
+            self._shapes.append(_Shape(LINE, points, None, line, self._width(style), on, off, arrow))
 
     def circle(self, centre: Sequence[float], radius: float, role: str) -> None:
         """Disc or ring."""
-        style, fill, line = self.style(role)
-        if fill is None and line is not None and style.dash is None:
-            at = (centre[0] * self.ss, centre[1] * self.ss)
-            self.pg.draw.circle(self.surface, line[:3], at, (radius + 0.5 * style.width) * self.ss, self._width(style))
-            return
-        if fill is None and line is not None and style.dash is not None and radius < 5000.0:
-            x, y = centre
-            ring = _ring(round(radius, 1), *style.dash) + np.array((x, y, x, y))
-            self._dashes(seen(ring, self.frame), line, style)
-            return
-        n = int(np.clip(radius * 0.8, 24, 360))
-        self.polygon(radius * _unit_circle(n) + centre, role)
+        style, fill, _, line = look(role, self.palette)
+        if fill is None and style.dash is None:
+            outer = (radius + 0.5 * style.width) * self.ss
+            self._shapes.append(_Shape(SPOTS, np.array([centre]), None, line, self._width(style), radius=outer))
+        else:
+            n = min(max(int(0.8 * radius), 24), 360)
+            self.polygon(radius * _unit_circle(n) + centre, role)
 
     def dots(self, points: Points, role: str, px: float) -> None:
         """Small discs."""
-        _, fill, line = self.style(role)
-        colour = fill or line
-        if colour is None:
-            return
-        radius = max(round(0.5 * px * self.ss), 1)
-        for x, y in np.rint(seen(points, self.frame) * self.ss).astype(int).tolist():
-            if colour[3] < 255:
-                self.pg.gfxdraw.filled_circle(self.surface, x, y, radius, colour)
-            else:
-                self.pg.draw.circle(self.surface, colour[:3], (x, y), radius)
-
-    def tint(self, points: Points, role: str) -> None:
-        """Fill an outline as if its translucent colour lay on the bare sea: where two overlap it is no darker."""
-        fill = self.style(role)[1]
-        shape = clip(points, self.frame)
-        if fill is not None and len(shape) > 2:
-            self._fill(shape, self._on_sea(fill))
+        _, fill, _, line = look(role, self.palette)
+        self._shapes.append(_Shape(DOTS, points, fill or line, radius=max(round(0.5 * px * self.ss), 1)))
 
     # --- text --------------------------------------------------------------------------------------------------------
     def text(
@@ -232,6 +256,8 @@ class Canvas:
         halo: bool = False,
     ) -> None:
         """Text with its top left at ``at``; align 0.5 centres it, 1 ends it there.  The halo is in the area colour."""
+        if not text.strip():
+            return  # nothing to make smaller
         style = STYLES[role]
         edge = 1 if halo else 0
         fill = style.fill(self.palette) if halo else ""
@@ -239,147 +265,105 @@ class Canvas:
         x = at[0] * self.ratio - align * (image.get_width() - 2 * edge) - edge
         self._text.append((image, (round(x), round(at[1] * self.ratio) - edge)))
 
+    # --- drawing -----------------------------------------------------------------------------------------------------
     def finish(self) -> Any:
-        """The picture as a surface."""
-        whole = self.surface.get_size() == self.pixels
-        out = self.surface if whole else self.pg.transform.smoothscale(self.surface, self.pixels)
+        """The picture as a surface of 32 bits."""
+        pg, (width, height), times = self.pg, self.pixels, self.supersample
+        out = pg.Surface(self.pixels, 0, 32)
+        large = out if times == 1 else _spare(pg, (width * times, height * times))
+        large.fill(self.ground)
+        if self._shapes:
+            self._draw(large)
+        if times > 1:
+            average(pg.surfarray.pixels2d(large).T, times, pg.surfarray.pixels2d(out).T)
+            _SPARE[:] = [large][: width * height * times * times <= KEPT]
         out.blits(self._text, doreturn=False)
         return out
-
-    # --- the inner drawing -----------------------------------------------------------------------------------------
-    def _on_sea(self, colour: RGBA) -> RGBA:
-        """Opaque colour of a translucent one over the bare sea."""
-        if colour[3] == 255:
-            return colour
-        sea, k = rgba(STYLES["sea"].fill(self.palette)) or colour, colour[3] / 255.0
-        r, g, b = (round(k * c + (1.0 - k) * s) for c, s in zip(colour[:3], sea[:3], strict=True))
-        return r, g, b, 255
 
     def _width(self, style: Style) -> int:
         return max(round(style.width * self.ss), 1)
 
-    def _fill(self, shape: Points, colour: RGBA) -> None:
-        corners = np.rint(shape * self.ss).astype(int).tolist()
-        if colour[3] < 255:
-            self.pg.gfxdraw.filled_polygon(self.surface, corners, colour)
-        else:
-            self.pg.draw.polygon(self.surface, colour[:3], corners)
+    def _draw(self, surface: Any) -> None:
+        shapes = self._shapes
+        first = np.cumsum([0, *(len(s.points) for s in shapes)])
+        jointed = [s.joints and s.width > 2 and s.line is not None for s in shapes]
+        kind, arrow = np.array([s.kind for s in shapes]), np.array([s.arrow for s in shapes])
+        on, off = np.array([s.on for s in shapes]), np.array([s.off for s in shapes])
+        points = np.concatenate([s.points for s in shapes])
+        corners, start, joints, joint_start = trace(
+            points, first, kind, arrow, np.array(jointed), on, off, self.frame, self.ss
+        )
+        places, begin, bends, bend = corners.tolist(), start.tolist(), joints.tolist(), joint_start.tolist()
+        pixels = self.pg.surfarray.pixels2d(surface).T
+        for k, shape in enumerate(shapes):
+            path = places[begin[k] : begin[k + 1]]
+            if shape.together != 1:
+                if shape.together:
+                    flood(pixels, corners, start[k : k + shape.together + 1], shape.radius, _number(shape.fill))
+            elif not path:
+                continue
+            elif shape.kind == AREA:
+                if shape.fill is not None and shape.fill[3] < 255:
+                    outline = corners[begin[k] : begin[k + 1]]
+                    blend(pixels, outline, _number(shape.fill), round(shape.fill[3] * 256 / 255))
+                self._area(surface, shape, path)
+            elif shape.kind == LINE:
+                self._line(surface, shape, path)
+            else:
+                self._discs(surface, shape, path)
+            for j in bends[bend[k] : bend[k + 1]]:  # fill the notch on the outside of bends
+                self.pg.draw.circle(surface, shape.line, places[j], 0.5 * shape.width)
 
-    def _stroke(self, points: Points, colour: RGBA, style: Style, closed: bool = False) -> None:
-        """Lines of the style's width with round joints."""
-        draw, surface, width = self.pg.draw, self.surface, self._width(style)
-        rgb = self._on_sea(colour)[:3]  # thin decoration needs no true blending
-        if style.dash is not None:
-            line = np.vstack((points, points[:1])) if closed else points
-            self._dashes(dashes(line, *style.dash, self.frame), colour, style)
+    def _area(self, surface: Any, shape: _Shape, path: list[list[int]]) -> None:
+        if len(path) < 3:
             return
-        path = _thin(points) * self.ss
-        draw.lines(surface, rgb, closed, path.tolist(), width)
-        if width > 2 and len(path) > 2:  # fill the notch on the outside of bends
-            if closed:
-                path = np.vstack((path[-1:], path, path[:1]))
-            leg = path[1:] - path[:-1]
-            length = np.hypot(leg[:, 0], leg[:, 1])
-            bend = (leg[:-1] * leg[1:]).sum(axis=1) < 0.96 * length[:-1] * length[1:]
-            for p in path[1:-1][bend].tolist():
-                draw.circle(surface, rgb, p, 0.5 * width)
+        if shape.fill is not None and shape.fill[3] == 255:
+            self.pg.draw.polygon(surface, shape.fill, path)
+        if shape.line is not None:
+            self.pg.draw.lines(surface, shape.line, True, path, shape.width)
 
-    def _dashes(self, pieces: Points, colour: RGBA, style: Style) -> None:
-        line, surface, width, rgb = self.pg.draw.line, self.surface, self._width(style), self._on_sea(colour)[:3]
-        for x0, y0, x1, y1 in (self.ss * pieces).tolist():
-            line(surface, rgb, (x0, y0), (x1, y1), width)
+    def _line(self, surface: Any, shape: _Shape, path: list[list[int]]) -> None:
+        if shape.arrow:
+            self.pg.draw.polygon(surface, shape.line, path[:3])
+            path = path[3:]
+        if shape.on == 0.0:
+            self.pg.draw.lines(surface, shape.line, False, path, shape.width)
+            return
+        line, colour, width = self.pg.draw.line, shape.line, shape.width
+        for begin, end in zip(path[::2], path[1::2], strict=True):
+            line(surface, colour, begin, end, width)
 
-    def _arrow(self, points: Points, colour: RGBA) -> Points:
-        """Draw the head at the end of a line and return the line without it."""
-        tip, back = points[-1], points[-2]
-        length = math.hypot(*(tip - back))
-        size = min(10.0, 0.6 * length)
-        if size < 2.0:
-            return points
-        along = (tip - back) / length
-        across = np.array([-along[1], along[0]])
-        base = tip - size * along
-        head = clip(np.array([tip, base + 0.38 * size * across, base - 0.38 * size * across]), self.frame)
-        if len(head) > 2:
-            self._fill(head, (*colour[:3], 255))
-        return np.vstack((points[:-1], base))
+    def _discs(self, surface: Any, shape: _Shape, path: list[list[int]]) -> None:
+        """Discs, or a ring."""
+        colour, ring = shape.fill or shape.line, shape.fill is None
+        if colour is None:
+            return
+        for at in path:
+            if colour[3] < 255:
+                self.pg.gfxdraw.filled_circle(surface, *at, int(shape.radius), colour)
+            else:
+                self.pg.draw.circle(surface, colour, at, shape.radius, shape.width if ring else 0)
+
+
+def _number(colour: RGBA | None) -> np.uint32:
+    """A colour as the pixels of a surface have it."""
+    assert colour is not None
+    return np.uint32(colour[0] << 16 | colour[1] << 8 | colour[2])
 
 
 def _rounded(x0: float, y0: float, x1: float, y1: float, r: float) -> Points:
+    """Outline of a rectangle with rounded corners."""
     if r <= 0.0:
         return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    return r * _CORNERS[0] + np.where(_CORNERS[1] > 0.0, (x1 - r, y1 - r), (x0 + r, y0 + r))
+
+
+def _corners() -> tuple[Points, Points]:
+    """Of the unit rectangle with rounded corners: points around the centres of the corners, and on which side those are."""
     b = np.linspace(0.0, 0.5 * math.pi, 6)
-    corners = ((x1 - r, y1 - r, 0.0), (x0 + r, y1 - r, 0.5), (x0 + r, y0 + r, 1.0), (x1 - r, y0 + r, 1.5))
-    return np.vstack(
-        [np.column_stack((cx + r * np.cos(b + q * math.pi), cy + r * np.sin(b + q * math.pi))) for cx, cy, q in corners]
-    )
+    angle = np.concatenate([b + q * math.pi for q in (0.0, 0.5, 1.0, 1.5)])
+    side = np.repeat(((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)), 6, axis=0)
+    return np.column_stack((np.cos(angle), np.sin(angle))), side
 
 
-def _thin(points: Points) -> Points:
-    """Drop points of a long line that are less than about a pixel from the last one kept."""
-    if len(points) < 200:
-        return points
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    keep = np.concatenate(([True], np.diff(np.floor(along / 1.2)) > 0))
-    keep[-1] = True
-    return points[keep]
-
-
-def _pixels(points: Points) -> Points:
-    """An outline without corners that are within a pixel of the one before."""
-    whole = np.rint(points)
-    kept: Points = points[(whole != np.roll(whole, 1, axis=0)).any(axis=1)]
-    return kept
-
-
-def dashes(points: Points, on: float, off: float, frame: Frame) -> Points:
-    """Pieces of a line that are drawn when ``on`` pixels are, then ``off`` are not: [n, 4] x, y, x, y in the frame."""
-    along = np.concatenate(((0.0,), np.hypot(*np.diff(points, axis=0).T).cumsum()))
-    starts = np.arange(0.0, along[-1], on + off)[:20000]
-    n, at = len(starts), np.concatenate((starts, np.minimum(starts + on, along[-1])))
-    x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
-    return seen(np.column_stack((x[:n], y[:n], x[n:], y[n:])), frame)
-
-
-def seen(points: Points, frame: Frame) -> Points:
-    """Those of points [n, >= 2] whose x, y lie in a rectangle."""
-    x0, y0, x1, y1 = frame
-    x, y = points[:, 0], points[:, 1]
-    return points[(x > x0) & (x < x1) & (y > y0) & (y < y1)]
-
-
-INSIDE, ACROSS, OUTSIDE = range(3)
-
-
-def _where(points: Points, frame: Frame) -> int:
-    """How points lie to a rectangle; plain numbers, for most outlines are short."""
-    x, y = zip(*points.tolist(), strict=True)
-    left, right, top, bottom = min(x), max(x), min(y), max(y)
-    x0, y0, x1, y1 = frame
-    if left >= x0 and top >= y0 and right <= x1 and bottom <= y1:
-        return INSIDE
-    return OUTSIDE if right < x0 or bottom < y0 or left > x1 or top > y1 else ACROSS
-
-
-def clip(points: Points, frame: Frame) -> Points:
-    """Part of a polygon inside a rectangle (Sutherland-Hodgman), for gfxdraw counts pixels in 16 bits."""
-    where = _where(points, frame)
-    if where != ACROSS:
-        return points if where == INSIDE else points[:0]
-    x0, y0, x1, y1 = frame
-    shape = points
-    for axis, bound, sign in ((0, x0, 1.0), (0, x1, -1.0), (1, y0, 1.0), (1, y1, -1.0)):
-        # for each edge p -> q: where it crosses the bound, then q if that is inside
-        dq = sign * (shape[:, axis] - bound)
-        inside = dq >= 0.0
-        if inside.all():
-            continue
-        before = np.arange(-1, len(shape) - 1)
-        p, dp = shape[before], dq[before]
-        crosses = inside[before] != inside
-        share = np.divide(dp, dp - dq, out=np.zeros_like(dp), where=crosses)
-        both = np.stack((p + share[:, None] * (shape - p), shape), axis=1)
-        shape = both[np.column_stack((crosses, inside))]
-        if not len(shape):
-            return points[:0]
-    return shape
+_CORNERS = _corners()

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .. import jit
 
 Box = tuple[float, float, float, float]
-Boxes = NDArray[np.float64]
 
 GAP = 3.0  #: [px] between an object and its label
 LEADER = 14.0  #: [px] a label further from its object than this gets a line to it
@@ -30,7 +30,9 @@ def _candidate(angle: float, price: float, distance: float) -> tuple[float, ...]
 
 
 #: cheapest first: price, distance [px], direction, and how far the box goes that way, in halves of its size
-_CANDIDATES = sorted(_candidate(angle, price, d) for angle, price in _ANGLES for d in _DISTANCES)
+_CANDIDATES = np.array(sorted(_candidate(angle, price, d) for angle, price in _ANGLES for d in _DISTANCES))
+FURTHEST = _DISTANCES[-1]
+COVERING = 60.0  #: price of covering a body with the whole label
 
 
 @dataclass(frozen=True)
@@ -78,66 +80,107 @@ def place(
     list
         for each request its place, or None when there is none: two labels never overlap.
     """
-    out: list[Placed | None] = [None] * len(requests)
-    hard = np.zeros((len(keep_out) + len(requests), 4))  # what is taken
-    hard[: len(keep_out)] = np.reshape(keep_out, (-1, 4))
-    taken = len(keep_out)
-    soft = np.array(avoid, dtype=np.float64).reshape(-1, 4)
-    for i in sorted(range(len(requests)), key=lambda k: -requests[k].priority):
-        request = requests[i]
-        if not (frame[0] <= request.anchor[0] <= frame[2] and frame[1] <= request.anchor[1] <= frame[3]):
+    if not requests:
+        return []
+    numbers = np.array([(*r.size, *r.anchor, r.clearance, r.far, r.fixed) for r in requests], dtype=np.float64)
+    order = np.argsort([-r.priority for r in requests], kind="stable")
+    walls, bodies = (np.array(boxes, dtype=np.float64).reshape(-1, 4) for boxes in (keep_out, avoid))
+    boxes = _place(numbers, order, np.array(frame, dtype=np.float64), walls, bodies, _CANDIDATES)
+    return [
+        Placed((left, top, right, bottom), _leader(request, (left, top, right, bottom))) if right > left else None
+        for request, (left, top, right, bottom) in zip(requests, boxes.tolist(), strict=True)
+    ]
+
+
+@jit.kernel
+def _place(requests, order, frame, keep_out, avoid, candidates):
+    """Boxes [n, 4] of requests [n, 7] (width, height, x, y, clearance, far, fixed); of no width where there is no place."""
+    out = np.zeros((len(requests), 4))
+    taken, n = np.empty((len(keep_out) + len(requests), 4)), len(keep_out)
+    taken[:n] = keep_out
+    near, touched = np.empty(taken.shape), np.empty(avoid.shape)
+    for i in order:
+        request, box = requests[i], out[i]
+        x, y = request[2], request[3]
+        if not (frame[0] <= x <= frame[2] and frame[1] <= y <= frame[3]):
             continue  # what it belongs to is out of sight
-        box = _best(request, frame, hard[:taken], soft)
-        if box is not None:
-            hard[taken] = box
-            taken += 1
-            out[i] = Placed(box, _leader(request, box))
+        hard = _within_reach(request, taken[:n], near)
+        soft = _within_reach(request, avoid, touched)
+        if request[6] != 0.0:
+            _centred(box, request, x, y)
+            found = _inside(box, frame) and _covered(box, hard) == 0.0 and _covered(box, soft) == 0.0
+        else:
+            found = _best(box, request, frame, hard, soft, candidates)
+        if found:
+            taken[n] = box
+            n += 1
+        else:
+            box[:] = 0.0
     return out
 
 
-def _best(request: Request, frame: Box, hard: Boxes, soft: Boxes) -> Box | None:
-    """The cheapest free box.  Plain numbers: the first few candidates are good enough nearly always."""
-    (w, h), (x, y) = request.size, request.anchor
-    reach = 0.0 if request.fixed else request.clearance + GAP + min(request.far, _DISTANCES[-1])
-    around = (x - reach - w, y - reach - h, x + reach + w, y + reach + h)
-    taken, bodies = _touching(hard, around), _touching(soft, around)
-    if request.fixed:
-        box = (x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h)
-        return box if _inside(box, frame) and not any(_shared(box, other) for other in (*taken, *bodies)) else None
-    best, cheapest = None, math.inf
-    for price, distance, dx, dy, out_x, out_y in _CANDIDATES:
+@jit.inner
+def _best(best, request, frame, hard, soft, candidates):
+    """Write the cheapest free box; returns whether there is one."""
+    w, h, clearance, far = request[0], request[1], request[4], request[5]
+    cheapest, box = math.inf, np.empty(4)
+    for k in range(len(candidates)):
+        price, distance, dx, dy, out_x, out_y = candidates[k]
         if price >= cheapest:
             break
-        if distance > request.far:
+        if distance > far:
             continue
         # the box touches the circle of `r`: its centre is further out by its own half extent in that direction
-        r = request.clearance + GAP + distance
-        left, top = x + r * dx + 0.5 * w * (out_x - 1.0), y + r * dy + 0.5 * h * (out_y - 1.0)
-        box = (left, top, left + w, top + h)
-        if _inside(box, frame) and not any(_shared(box, other) for other in taken):
-            cost = price + 60.0 * sum(_shared(box, other) for other in bodies) / (w * h)
+        r = clearance + GAP + distance
+        _centred(box, request, request[2] + r * dx + 0.5 * w * out_x, request[3] + r * dy + 0.5 * h * out_y)
+        if _inside(box, frame) and _covered(box, hard) == 0.0:
+            cost = price + COVERING * _covered(box, soft) / (w * h)
             if cost < cheapest:
-                best, cheapest = box, cost
-    return best
+                cheapest = cost
+                best[:] = box
+    return cheapest < math.inf
 
 
-def _touching(boxes: Boxes, around: Box) -> list[Box]:
-    """Those of boxes [n, 4] that overlap one."""
-    x0, y0, x1, y1 = around
-    touching = (boxes[:, 0] < x1) & (boxes[:, 1] < y1) & (boxes[:, 2] > x0) & (boxes[:, 3] > y0)
-    found: list[Box] = boxes[touching].tolist()
-    return found
+@jit.inner
+def _within_reach(request, boxes, out):
+    """Those of boxes [n, 4] that a label could touch."""
+    reach = 0.0 if request[6] != 0.0 else request[4] + GAP + min(request[5], FURTHEST)
+    x, y = request[2], request[3]
+    n = 0
+    for k in range(len(boxes)):
+        b = boxes[k]
+        if (
+            b[0] < x + reach + request[0]
+            and b[1] < y + reach + request[1]
+            and b[2] > x - reach - request[0]
+            and b[3] > y - reach - request[1]
+        ):
+            out[n] = b
+            n += 1
+    return out[:n]
 
 
-def _inside(box: Box, frame: Box) -> bool:
+@jit.inner
+def _centred(box, request, x, y):
+    box[0], box[1] = x - 0.5 * request[0], y - 0.5 * request[1]
+    box[2], box[3] = box[0] + request[0], box[1] + request[1]
+
+
+@jit.inner
+def _inside(box, frame):
     return box[0] >= frame[0] and box[1] >= frame[1] and box[2] <= frame[2] and box[3] <= frame[3]
 
 
-def _shared(a: Box, b: Box) -> float:
-    """Area that two boxes share."""
-    width = (a[2] if a[2] < b[2] else b[2]) - (a[0] if a[0] > b[0] else b[0])
-    height = (a[3] if a[3] < b[3] else b[3]) - (a[1] if a[1] > b[1] else b[1])
-    return width * height if width > 0.0 and height > 0.0 else 0.0
+@jit.inner
+def _covered(box, others):
+    """Area that a box shares with others, together."""
+    area = 0.0
+    for k in range(len(others)):
+        width = min(box[2], others[k, 2]) - max(box[0], others[k, 0])
+        height = min(box[3], others[k, 3]) - max(box[1], others[k, 1])
+        if width > 0.0 and height > 0.0:
+            area += width * height
+    return area
 
 
 def _leader(request: Request, box: Box) -> tuple[tuple[float, float], tuple[float, float]] | None:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import io
 import math
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ from .panel_view import WIDTH as PANEL_WIDTH
 from .panel_view import draw_panel
 from .primitives import LAYERS, Area, Circle, Dots, Fringe, Label, Points, Polygon, Polyline, Primitive, Scene
 from .shapes import nice_step
+from .trace import unpack
 
 SIZES = (12, 11)  #: [px] of the first and the second line of a label
 IMPORTANT = 4.0  #: labels of this priority are moved far before they are left out
@@ -72,8 +75,9 @@ def render(
 ) -> NDArray[np.uint8]:
     """Picture of a scene as an array [height, width, 3] of red, green, blue; parameters and errors as `draw`."""
     surface = draw(scene, size, palette, view, panel=panel, supersample=supersample, ratio=ratio)
-    pixels = np.frombuffer(load_pygame().image.tobytes(surface, "RGB"), dtype=np.uint8)
-    return pixels.reshape(size[1], size[0], 3).copy()  # writable, like any array of an environment
+    image = np.empty((size[1], size[0], 3), np.uint8)
+    unpack(load_pygame().surfarray.pixels2d(surface).T, image)
+    return image
 
 
 def draw(
@@ -116,7 +120,7 @@ def draw(
         raise ValueError(f"unknown palette {palette!r}: one of {', '.join(PALETTES)}")
     if min(size) < 1 or supersample < 1 or not ratio > 0.0:
         raise ValueError(f"size, supersample and ratio must be positive, not {size}, {supersample} and {ratio}")
-    canvas = Canvas(size, palette, supersample, ratio)
+    canvas = Canvas(size, palette, supersample, ratio, "sea")
     width, height = map_size(canvas.size, panel)
     if width > 0:
         beside = width < canvas.size[0]
@@ -148,6 +152,17 @@ def save_png(picture: NDArray[np.uint8] | Scene, path: str | os.PathLike[str], *
         file.write(buffer.getvalue())
 
 
+def _points(p: Primitive) -> Points:
+    """Points of a primitive that has any: of an area those of its shell."""
+    points: Points = (
+        p.shell if isinstance(p, Area) else p.ring if isinstance(p, Fringe) else getattr(p, "points", _NONE)
+    )
+    return points
+
+
+_NONE = np.zeros((0, 2))
+
+
 class _Map:
     """The map of one picture, in the rectangle (0, 0, width, height) of a canvas."""
 
@@ -161,19 +176,18 @@ class _Map:
 
     def draw(self) -> None:
         """Everything, bottom up; labels last, for they look for free places."""
-        self.canvas.box((0, 0, *self.canvas.size), "sea")
         layers = self.scene.layers
-        for p in layers.get("shallows", []):
-            if isinstance(p, Fringe):
-                self.canvas.fringe(self.px(p.ring), p.width * self.view.scale, p.role)
-        for p in layers.get("shadows", []):
-            if isinstance(p, Polygon):
-                self.canvas.tint(self.px(p.points), p.role)
+        shallows = [p for p in layers.get("shallows", []) if isinstance(p, Fringe)]
+        for (width, role), fringes in groupby(shallows, lambda p: (p.width, p.role)):
+            self.canvas.fringe([self.px(p.ring) for p in fringes], width * self.view.scale, role)
+        shadows = [p for p in layers.get("shadows", []) if isinstance(p, Polygon)]
+        for role, wedges in groupby(shadows, lambda p: p.role):
+            self.canvas.tint([self.px(p.points) for p in wedges], role)
         self._grid()
         for name in LAYERS:
             if name not in ("shallows", "shadows", "labels"):
-                for primitive in layers.get(name, []):
-                    self._primitive(primitive, name in ("obstacles", "vessels", "own"))
+                for primitive, points in self._projected(layers.get(name, [])):
+                    self._primitive(primitive, points, name in ("obstacles", "vessels", "own"))
         if min(self.width, self.height) >= BARE:
             plates = self._furniture()
             self._labels([p for p in layers.get("labels", []) if isinstance(p, Label)], plates)
@@ -186,25 +200,34 @@ class _Map:
     def _at(self, place: tuple[float, float]) -> tuple[float, float]:
         return self.view.pixel(place, (self.width, self.height))
 
-    def _primitive(self, p: Primitive, body: bool) -> None:
+    def _projected(self, primitives: list[Primitive]) -> Iterator[tuple[Primitive, Points]]:
+        """Primitives with their points [px], all of a layer projected at once."""
+        if not primitives:
+            return
+        points = [np.array([p.centre]) if isinstance(p, Circle) else _points(p) for p in primitives]
+        ends = np.cumsum([len(some) for some in points]).tolist()
+        pixels = self.px(np.concatenate(points))
+        for p, begin, end in zip(primitives, [0, *ends[:-1]], ends, strict=True):
+            yield p, pixels[begin:end]
+
+    def _primitive(self, p: Primitive, points: Points, body: bool) -> None:
         if isinstance(p, Polygon):
-            points = self._outline(p)
+            points = self._grown(p, points)
             self.canvas.polygon(points, p.role)
             if body:
-                (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
-                self.bodies.append((float(x0), float(y0), float(x1), float(y1)))
+                (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+                self.bodies.append((x0, y0, x1, y1))
         elif isinstance(p, Area):
-            self.canvas.area(self.px(p.shell), [self.px(hole) for hole in p.holes], p.role, "lake")
+            self.canvas.area(points, [self.px(hole) for hole in p.holes], p.role, "lake")
         elif isinstance(p, Polyline):
-            self.canvas.polyline(self.px(p.points), p.role, p.arrow)
+            self.canvas.polyline(points, p.role, p.arrow)
         elif isinstance(p, Circle):
-            self.canvas.circle(self._at(p.centre), max(p.radius * self.view.scale, 0.5 * p.min_px), p.role)
+            self.canvas.circle(points[0], max(p.radius * self.view.scale, 0.5 * p.min_px), p.role)
         elif isinstance(p, Dots):
-            self.canvas.dots(self.px(p.points), p.role, p.px)
+            self.canvas.dots(points, p.role, p.px)
 
-    def _outline(self, p: Polygon) -> Points:
-        """Pixels of a polygon, grown about its anchor to the smallest size it is drawn at."""
-        points = self.px(p.points)
+    def _grown(self, p: Polygon, points: Points) -> Points:
+        """Points of a polygon, grown about its anchor to the smallest size it is drawn at."""
         size = p.size * self.view.scale
         if 0.0 < size < p.min_px:
             anchor = np.array(self._at(p.anchor))

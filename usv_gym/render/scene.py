@@ -102,24 +102,14 @@ def sea_from_record(world: Any, names: Sequence[str] = (), observer: int = 0, co
 
 
 def _detections(p: Any, o: int) -> list[Detection]:
+    sources = np.flatnonzero(p["id"][o])
+    fields = ("id", "descriptor", "position", "cog", "sog", "radius", "covariance", "sensors", "motion_known")
+    columns = [p[field][o][sources].tolist() for field in fields]
     return [
-        Detection(
-            source=int(s),
-            id=int(p["id"][o, s]),
-            descriptor=int(p["descriptor"][o, s]),
-            position=(float(p["position"][o, s, 0]), float(p["position"][o, s, 1])),
-            cog=float(p["cog"][o, s]),
-            sog=float(p["sog"][o, s]),
-            radius=float(p["radius"][o, s]),
-            covariance=(
-                float(p["covariance"][o, s, 0]),
-                float(p["covariance"][o, s, 1]),
-                float(p["covariance"][o, s, 2]),
-            ),
-            sensors=int(p["sensors"][o, s]),
-            motion_known=bool(p["motion_known"][o, s]),
+        Detection(s, id_, descriptor, tuple(position), cog, sog, radius, tuple(covariance[:3]), sensors, bool(known))
+        for s, id_, descriptor, position, cog, sog, radius, covariance, sensors, known in zip(
+            sources.tolist(), *columns, strict=True
         )
-        for s in np.flatnonzero(p["id"][o])
     ]
 
 
