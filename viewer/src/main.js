@@ -136,8 +136,9 @@ class Page {
     if (now === this.now) return;
     this.now = now;
     [...$("events").children].forEach((b, k) => b.classList.toggle("now", k === now));
-    const { offsetTop: top } = $("events").children[now] ?? { offsetTop: 0 };
-    $("events").scrollTop = top - $("events").clientHeight / 2;
+    const row = $("events").children[now] ?? { offsetTop: 0, offsetHeight: 1 };
+    const above = Math.floor(($("events").clientHeight - row.offsetHeight) / 2 / row.offsetHeight);  // whole rows
+    $("events").scrollTop = row.offsetTop - above * row.offsetHeight - 4;
   }
 
   showGauges(own, i) {
@@ -158,6 +159,7 @@ class Page {
       const label = $("groups").appendChild(document.createElement("label"));
       const box = label.appendChild(Object.assign(document.createElement("input"), { type: "checkbox", checked: on, id: `show-${name}` }));
       label.append(caption);
+      label.hidden = name === "land" && !this.episode.header.land?.length;
       box.addEventListener("change", () => this.show(name, box.checked));
     }
   }
