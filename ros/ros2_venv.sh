@@ -3,7 +3,7 @@
 # usage: ros/ros2_venv.sh VENV [PYTHON]
 #   VENV    where to make it.  Keep it apart from others: its wheels start every python in it anew to find their libraries.
 #   PYTHON  an interpreter whose environment has usv_gym; its packages then stand behind those of VENV, so that
-#           `VENV/bin/python -m usv_gym hil ..` works.  It must be of the same version, with the same NumPy.
+#           `VENV/bin/usv-gym hil ..` works.  It must be of the same version, with the same NumPy.
 # Needs: python3.11 with its headers, a C and C++ compiler.
 set -euo pipefail
 venv="$1" python="${2:-}" here="$(cd "$(dirname "$0")" && pwd)"
@@ -34,5 +34,7 @@ if [ -n "$python" ]; then
     # a file of paths is read behind the environment's own packages, so those win
     "$python" -c 'import pathlib, sys, usv_gym
 print(*(p for p in sys.path if "packages" in p), pathlib.Path(usv_gym.__file__).parents[1], sep="\n")' > "$venv/lib/python3.11/site-packages/zz_usv_gym.pth"
+    printf '#!%s\nfrom usv_gym.cli import main\n\nif __name__ == "__main__":\n    main()\n' "$py" > "$venv/bin/usv-gym"
+    chmod +x "$venv/bin/usv-gym"
 fi
 "$py" -c 'from usv_gym_msgs.msg import Targets; import rclpy'

@@ -3,7 +3,7 @@
 
     rosmaster --core -p 11311 &
     usv-gym hil calm_crossing --backend ros1 --profile hilsim
-    PYTHONPATH=messages python3 ros1_controller.py --route 59.4400,10.4717 59.4422,10.4727
+    PYTHONPATH=messages /usr/bin/python3 ros1_controller.py --route 59.4400,10.4717 59.4422,10.4727
 
 Needs rospy and the package simulator_messages, built by catkin or by ros/ros1_messages.sh.  It answers every sensors/odom.
 """
