@@ -329,6 +329,7 @@ def test_topics_faster_than_a_transport_are_thinned_and_that_is_said():
     link = Link(load_profile("standard"), [Slow()], factor=20.0)
     assert any("sensors/position/odometry: 20 Hz at 20 times real time: sent at 10 Hz" in note for note in link.notes)
     assert all(out.rate <= 10.0 for out in link.out if out.rate)
+    assert any("sensors/imu/imu/data" in note and note.endswith("at most 10 Hz") for note in link.notes)
 
 
 # --- profiles --------------------------------------------------------------------------------------------------------

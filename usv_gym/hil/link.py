@@ -39,8 +39,9 @@ class _Out:
         if self.rate and factor * self.rate > max_rate:
             self.note = f"{row.topic}: {self.rate:g} Hz at {factor:g} times real time: sent at {max_rate / factor:g} Hz"
             self.rate = max_rate / factor
-        elif not self.rate and factor * 100.0 > max_rate:
-            self.rate = max_rate / factor  # as fast as sensors fire, which may be too fast
+        self.limited = not self.rate and factor * 100.0 > max_rate
+        if self.limited:
+            self.rate = max_rate / factor  # else as fast as sensors fire, which may be too fast
         self.period_us = round(1e6 / self.rate) if self.rate else 0
         self.last = -1
 
@@ -99,6 +100,8 @@ class Link:
         self._index = {row: k for k, row in enumerate(self.incoming)}
         self.required = command_rows(self.incoming, self.control)
         self.notes = [out.note for out in self.out if out.note]
+        if unrated := [out for out in self.out if out.limited and out.row.signal not in NEW_ONLY]:
+            self.notes.append(f"{', '.join(out.row.topic for out in unrated)}: at most {unrated[0].rate:g} Hz")
         self.mailbox = Mailbox()
         self.counters: Counter[str] = Counter()
         self.sent: Counter[str] = Counter()
