@@ -20,7 +20,7 @@ from usv_gym.render.canvas import load_pygame
 from usv_gym.render.desk import BAR, SPEEDS, Desk
 from usv_gym.render.primitives import Circle, Polyline
 from usv_gym.replay.archive import load, save
-from usv_gym.run import plan, resimulate
+from usv_gym.run import listing, plan, resimulate, write_outputs
 
 pg = load_pygame()
 SCENARIO: dict[str, Any] = {
@@ -460,7 +460,7 @@ def test_human_mode_shows_every_step(monkeypatch):
     env.close()
 
 
-def test_human_mode_without_pygame_says_what_to_install(monkeypatch):
+def test_human_mode_without_pygame_says_what_to_install(monkeypatch, episode, tmp_path):
     monkeypatch.setitem(sys.modules, "pygame", None)
     load_pygame.cache_clear()
     try:
@@ -469,6 +469,10 @@ def test_human_mode_without_pygame_says_what_to_install(monkeypatch):
         env = gym.make("usv_gym/Scenario-v0", scenario=SCENARIO)  # headless needs none
         env.reset(seed=1)
         env.step(env.action_space.sample())
+        (tmp_path / "map.png").touch()  # of an earlier run
+        with pytest.warns(UserWarning, match="map.png is left out: .*pip install pygame-ce"):
+            write_outputs(episode, tmp_path)
+        assert listing(tmp_path) == "episode.usv  ais.nmea  detections.csv  summary.json"
     finally:
         load_pygame.cache_clear()
 

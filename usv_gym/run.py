@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from .tasks.task import TaskConfig
 from .voyage import Mission, Voyage
 from .world.vessel import load_vessel
 
+OUTPUTS = ("episode.usv", "ais.nmea", "detections.csv", "map.png", "summary.json")
 #: called after every control step with (simulated seconds, seconds in all)
 Progress = Callable[[float, float], None]
 
@@ -112,7 +114,7 @@ def write_outputs(
 ) -> dict[str, Any]:
     """Leave ``episode.usv``, ``ais.nmea``, ``detections.csv``, ``map.png`` and ``summary.json`` in a directory.
 
-    Each file appears whole or not at all.  Returns the summary.
+    Each file appears whole or not at all; without pygame the map is left out, with a warning.  Returns the summary.
 
     Raises
     ------
@@ -128,12 +130,27 @@ def write_outputs(
         save(episode, directory / "episode.usv")
         write_nmea(episode, directory / "ais.nmea")
         write_detections(episode, directory / "detections.csv")
-        if picture:
-            from .render.pygame_view import save_png
-            from .render.scene_episode import scene_from_episode
-
-            save_png(scene_from_episode(episode), directory / "map.png")
         write_summary(result, directory / "summary.json")
+        if picture:
+            _draw(episode, directory / "map.png")
     except OSError as error:
         raise ConfigError(f"{directory}: cannot be written: {error.strerror or error}") from None
     return result
+
+
+def _draw(episode: Episode, path: Path) -> None:
+    from gymnasium.error import DependencyNotInstalled
+
+    from .render.pygame_view import save_png
+    from .render.scene_episode import scene_from_episode
+
+    try:
+        save_png(scene_from_episode(episode), path)
+    except DependencyNotInstalled as error:
+        path.unlink(missing_ok=True)  # one of an earlier run
+        warnings.warn(f"{path.name} is left out: {error}", stacklevel=2)
+
+
+def listing(directory: Path) -> str:
+    """What `write_outputs` has left, for a line on the terminal."""
+    return "  ".join(name for name in OUTPUTS if (directory / name).exists())

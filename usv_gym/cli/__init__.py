@@ -24,7 +24,7 @@ def _short_warning(message: Warning | str, category: type[Warning], *_: object, 
 
 
 def main() -> None:
-    """Entry point: errors of input become one line and exit code 2."""
+    """Entry point: errors of input, and what is not installed, become one line and exit code 2."""
     from ..config import ConfigError
     from ..replay.archive import ArchiveError
 
@@ -32,6 +32,13 @@ def main() -> None:
     try:
         app()
     except (ConfigError, ArchiveError) as error:
+        complain(error)
+        sys.exit(2)
+    except Exception as error:
+        from gymnasium.error import DependencyNotInstalled  # here, for it takes its time
+
+        if not isinstance(error, DependencyNotInstalled):
+            raise
         complain(error)
         sys.exit(2)
     except KeyboardInterrupt:

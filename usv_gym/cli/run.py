@@ -31,7 +31,7 @@ def run(
     """Run a scenario headless and leave archive, AIS sentences, detections, map and summary."""
     from rich.console import Console
 
-    from ..run import plan, write_outputs
+    from ..run import listing, plan, write_outputs
     from ..run import run as run_mission
 
     console = Console(quiet=quiet)
@@ -58,4 +58,4 @@ def run(
         from ..replay.outputs import print_summary
 
         print_summary(result, console)
-        console.print(f"[bold]{directory}[/]: episode.usv  ais.nmea  detections.csv  map.png  summary.json")
+        console.print(f"[bold]{directory}[/]: {listing(directory)}")

@@ -25,7 +25,7 @@ def play(
     """Sail a scenario in a window: by keyboard or gamepad, or watch a policy; spawn and move obstacles with the mouse."""
     from ..config import ConfigError
     from ..play import Live, plan_by_hand, show
-    from ..run import plan, write_outputs
+    from ..run import listing, plan, write_outputs
 
     if record is not None and record.exists() and not record.is_dir():
         raise ConfigError(f"{record}: is a file; expected a directory for the results")
@@ -38,7 +38,7 @@ def play(
     live = show(lambda: Live(mission), palette=palette, ratio=scale)
     if record is not None:
         write_outputs(live.voyage.finish(), record)
-        typer.echo(f"{record}: episode.usv  ais.nmea  detections.csv  map.png  summary.json")
+        typer.echo(f"{record}: {listing(record)}")
 
 
 @app.command()

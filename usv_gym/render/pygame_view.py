@@ -286,7 +286,7 @@ class _Map:
     def _title(self) -> Box:
         """Title, times and the most wanted gauges in a strip at the top left."""
         c, panel = self.canvas, self.scene.panel
-        lines = [" · ".join((panel.title, *panel.status)), "   ".join(f"{k} {v}" for k, v in panel.gauges[:3])]
+        lines = [" · ".join((panel.title, *panel.status)), "   ".join(f"{k} {v}" for k, v in panel.gauges[:4])]
         room = self.width - 110.0
         lines = [line for line in lines if line]
         size = next((s for s in (13, 12, 11, 10) if max(text_size(t, s)[0] for t in lines) + 20.0 <= room), 0)
