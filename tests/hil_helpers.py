@@ -151,7 +151,7 @@ def bridge(python, environment, out, *arguments, **kwargs):
                  env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **kwargs)  # fmt: skip
 
 
-def finish(process, timeout=90):
+def finish(process, timeout=150):
     text, _ = process.communicate(timeout=timeout)
     assert process.returncode == 0, text
     return text

@@ -59,7 +59,7 @@ class Duel:
 
     def finish(self):
         self.running.send_signal(signal.SIGINT)
-        assert self.running.wait(30) == 0
+        assert self.running.wait(150) == 0  # what draws and judges may have to be compiled first
 
     def close(self, *others):
         for each in (self.process, *others, self.running):
@@ -236,7 +236,7 @@ class Fuzz:
             told = json.loads(self.flood.stdout.read())
             assert self.flood.wait(30) == 0
             self.running.send_signal(signal.SIGINT)
-            assert self.running.wait(30) == 0
+            assert self.running.wait(150) == 0  # what draws and judges may have to be compiled first
         finally:
             self.close()
         report = {line.partition(": ")[0]: line.partition(": ")[2] for line in self.said.lines}
