@@ -26,8 +26,9 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: FMA contraction only: NaN still behaves, and results are the same on every CPU that has FMA.
-_FLAGS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
+#: FMA contraction only: NaN still behaves, and results are the same on every CPU that has FMA.  Nothing here is passed as a C
+#: callback, so the wrappers for it, a twentieth of the compile time, are left out.
+_FLAGS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
 
 def inner(function: F) -> F:
