@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -58,15 +59,26 @@ def say(row: dict[str, Any], rest: str) -> None:
 
 
 def crews(seconds: float, sizes: tuple[int, ...]) -> list[dict[str, Any]]:
+    """Gain of as many threads as cores, on the machine as it is and with a busy process on every core."""
     cores = os.cpu_count() or 1
     rows = []
     for name, observation, filters in faces.SIGHTS[::2]:  # truth, tracks
+        arguments = faces.arguments(observation, filters, faces.sea())
         for worlds in sizes:
-            arguments = faces.arguments(observation, filters, faces.sea())
             gain = faces.threads(seconds, worlds, cores, **arguments)
             rate = faces.batch(seconds, worlds, cores, **arguments)["steps_per_s"]
             rows.append({"sight": name, "worlds": worlds, "threads": cores, "gain": gain, "steps_per_s": rate})
             print(f"  {name:14} B = {worlds:<5} {cores} threads {rate:>11,.0f} steps/s, {gain:.2f} x one", flush=True)
+        worlds = 256
+        others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(cores)]
+        try:
+            gain = faces.threads(4.0 * seconds, worlds, cores, "median", **arguments)
+        finally:
+            for other in others:
+                other.kill()
+                other.wait()
+        rows.append({"sight": name, "worlds": worlds, "threads": cores, "busy_processes": cores, "gain": gain})
+        print(f"  {name:14} B = {worlds:<5} {cores} threads beside {cores} busy processes: {gain:.2f} x one", flush=True)
     return rows
 
 
