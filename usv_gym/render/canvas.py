@@ -16,7 +16,8 @@ from .primitives import Points
 from .trace import AREA, BEADS, DOTS, LINE, SPOTS, average, blend, flood, trace
 
 RGBA = tuple[int, int, int, int]
-FINE = 4  #: text is written this many times as large and made smaller
+FINE = 3  #: text is written this many times as large and made smaller
+APART = "  "  #: between words that are written, and kept for the next picture, each on its own: numbers that change
 
 
 @functools.cache
@@ -59,10 +60,14 @@ def font(size: int) -> Any:
 def text_surface(text: str, size: int, colour: str, halo: str = "") -> Any:
     """Rendered text, with an outline of one pixel in the colour ``halo``."""
     pg = load_pygame()
-    front = _written(text, size, colour)
+    # it is written large and made smaller, for small letters have room for whole pixels only between them
+    large = font(size * FINE).render(text, True, rgba(colour)[:3])  # type: ignore[index]
+    front = pg.transform.smoothscale(large, text_size(text, size))
     if not halo:
         return front
-    back = _written(text, size, halo)
+    back = front.copy()
+    back.fill((0, 0, 0, 255), special_flags=pg.BLEND_RGBA_MULT)
+    back.fill((*rgba(halo)[:3], 0), special_flags=pg.BLEND_RGBA_ADD)  # type: ignore[index]
     out = pg.Surface((front.get_width() + 2, front.get_height() + 2), pg.SRCALPHA)
     for dx, dy in ((0, 0), (2, 0), (0, 2), (2, 2), (1, 0), (0, 1), (2, 1), (1, 2)):
         out.blit(back, (dx, dy))
@@ -70,17 +75,18 @@ def text_surface(text: str, size: int, colour: str, halo: str = "") -> Any:
     return out
 
 
-def _written(text: str, size: int, colour: str) -> Any:
-    """Rendered text.  It is written large and made smaller, for small letters have room for whole pixels only between them."""
-    large = font(size * FINE).render(text, True, rgba(colour)[:3])  # type: ignore[index]
-    return load_pygame().transform.smoothscale(large, text_size(text, size))
-
-
 @functools.lru_cache(maxsize=4096)
 def text_size(text: str, size: int) -> tuple[int, int]:
     """Width and height of a text [px]."""
-    width, height = font(size * FINE).size(text)
-    return max(math.ceil(width / FINE), 1), math.ceil(height / FINE)
+    parts = text.split(APART)
+    width, height = font(size * FINE).size(parts[0])
+    more = sum(text_size(part, size)[0] + apart(size) for part in parts[1:])
+    return max(math.ceil(width / FINE), 1) + more, math.ceil(height / FINE)
+
+
+def apart(size: int) -> int:
+    """Room [px] between words that stand apart."""
+    return round(0.56 * size)
 
 
 def fitting(text: str, room: float, size: int) -> str:
@@ -256,14 +262,16 @@ class Canvas:
         halo: bool = False,
     ) -> None:
         """Text with its top left at ``at``; align 0.5 centres it, 1 ends it there.  The halo is in the area colour."""
-        if not text.strip():
-            return  # nothing to make smaller
-        style = STYLES[role]
+        style, points = STYLES[role], round(size * self.ratio)
         edge = 1 if halo else 0
-        fill = style.fill(self.palette) if halo else ""
-        image = text_surface(text, round(size * self.ratio), style.line(self.palette), fill)
-        x = at[0] * self.ratio - align * (image.get_width() - 2 * edge) - edge
-        self._text.append((image, (round(x), round(at[1] * self.ratio) - edge)))
+        x = at[0] * self.ratio - (align * text_size(text, points)[0] if align else 0.0) - edge
+        top = round(at[1] * self.ratio) - edge
+        for word in text.split(APART):
+            if word.strip():  # a blank cannot be made smaller
+                fill = style.fill(self.palette) if halo else ""
+                image = text_surface(word, points, style.line(self.palette), fill)
+                self._text.append((image, (round(x), top)))
+            x += text_size(word, points)[0] + apart(points)
 
     # --- drawing -----------------------------------------------------------------------------------------------------
     def finish(self) -> Any:

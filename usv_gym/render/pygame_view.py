@@ -163,6 +163,15 @@ def _points(p: Primitive) -> Points:
 _NONE = np.zeros((0, 2))
 
 
+def _boxes(outlines: list[Points]) -> list[Box]:
+    """Left, top, right, bottom of outlines."""
+    if not outlines:
+        return []
+    first = np.cumsum([0, *(len(points) for points in outlines[:-1])])
+    points = np.concatenate(outlines)
+    return np.hstack([edge.reduceat(points, first) for edge in (np.minimum, np.maximum)]).tolist()  # type: ignore[no-any-return]
+
+
 class _Map:
     """The map of one picture, in the rectangle (0, 0, width, height) of a canvas."""
 
@@ -172,7 +181,7 @@ class _Map:
         self.step = nice_step(width / view.scale, 8.0)  # of the grid [m]
         self._turn = np.array([(0.0, -view.scale), (view.scale, 0.0)])  # north, east to x, y
         self._origin = np.array(self._at((0.0, 0.0)))
-        self.bodies: list[Box] = []  # hulls and obstacles: labels rather stand beside them
+        self.bodies: list[Points] = []  # outlines of hulls and obstacles: labels rather stand beside them
 
     def draw(self) -> None:
         """Everything, bottom up; labels last, for they look for free places."""
@@ -215,8 +224,7 @@ class _Map:
             points = self._grown(p, points)
             self.canvas.polygon(points, p.role)
             if body:
-                (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-                self.bodies.append((x0, y0, x1, y1))
+                self.bodies.append(points)
         elif isinstance(p, Area):
             self.canvas.area(points, [self.px(hole) for hole in p.holes], p.role, "lake")
         elif isinstance(p, Polyline):
@@ -286,7 +294,7 @@ class _Map:
     def _title(self) -> Box:
         """Title, times and the most wanted gauges in a strip at the top left."""
         c, panel = self.canvas, self.scene.panel
-        lines = [" · ".join((panel.title, *panel.status)), "   ".join(f"{k} {v}" for k, v in panel.gauges[:4])]
+        lines = [" · ".join((panel.title, *panel.status)), "   ".join(f"{k} {v}" for k, v in panel.gauges[:4] if v != "-")]
         room = self.width - 110.0
         lines = [line for line in lines if line]
         size = next((s for s in (13, 12, 11, 10) if max(text_size(t, s)[0] for t in lines) + 20.0 <= room), 0)
@@ -303,7 +311,7 @@ class _Map:
     def _labels(self, labels: list[Label], keep_out: list[Box]) -> None:
         requests = [self._request(label) for label in labels]
         frame = (4.0, 4.0, self.width - 4.0, self.height - 4.0)
-        placed = place(requests, frame, keep_out, self.bodies)
+        placed = place(requests, frame, keep_out, _boxes(self.bodies))
         for result in placed:
             if result is not None and result.leader is not None:
                 self.canvas.polyline(np.array(result.leader), "leader")
