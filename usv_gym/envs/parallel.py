@@ -128,6 +128,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self._obs = np.zeros((1, MAX_AGENTS, observation_size(config)), np.float32)
         self._episodes = np.zeros((1, MAX_AGENTS), episode_dtype())
         self._rng: np.random.Generator | None = None
+        self._history: Any = None  # trails of the map
         w = self.worlds[0]
         state = 8 * len(w["vessels"]["active"]) + 4 * len(w["obstacles"]["active"])
         self.state_space = gym.spaces.Box(-np.inf, np.inf, (state,), np.float32)
@@ -147,6 +148,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         """Put all agents back; without a seed the last generator goes on."""
         if seed is not None or self._rng is None:
             self._rng = np_random(seed)[0]
+        self._history = None
         self.worlds[:] = self._template
         self.worlds["seed"] = self._rng.integers(0, 1 << 63, dtype=np.uint64)
         self._draw(self._rng)
@@ -206,10 +208,13 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
             gym.logger.warn("render() needs a render_mode; pass render_mode='rgb_array'")
             return None
         from ..render.pygame_view import render
-        from ..render.scene import scene_from_snapshot
+        from ..render.scene import History, scene_from_snapshot
 
+        if self._history is None:
+            self._history = History()
         observer = self._slot[self.agents[0]] if self.agents else 0
-        return render(scene_from_snapshot(self.worlds[0], self.names, observer=observer), size=(800, 800))
+        scene = scene_from_snapshot(self.worlds[0], self.names, self._history, observer=observer)
+        return render(scene, size=(800, 800))
 
     def close(self) -> None:
         """Nothing to close."""
