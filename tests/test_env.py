@@ -444,3 +444,18 @@ def test_render_without_a_mode_says_what_to_do():
     env.reset(seed=1)
     with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
         assert env.render() is None
+
+
+def test_a_compilation_is_announced_and_nothing_else(capsys):
+    import numba
+
+    from usv_gym.envs.notice import compiling
+
+    function = numba.njit(lambda x: x + x)
+    with compiling():
+        function(1)
+        function(1.0)  # another one within the same wait
+    assert capsys.readouterr().err.count("compiling kernels") == 1
+    with compiling():
+        function(2)
+    assert capsys.readouterr().err == ""

@@ -88,6 +88,7 @@ def _source_hash() -> str:
 
 
 def is_warm() -> bool:
-    """True when compiled kernels of exactly these sources are on disk already."""
-    directory = cache_directory()
-    return directory.is_dir() and any(directory.rglob("*.nbc"))
+    """True when compiled kernels of exactly these sources, in this place, are on disk already."""
+    steps = Path(__file__).resolve().parent / "tasks"
+    place = hashlib.sha1(str(steps).encode(), usedforsecurity=False).hexdigest()  # as numba names it
+    return any((cache_directory() / f"{steps.name}_{place}").glob("*.nbc"))

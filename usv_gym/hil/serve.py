@@ -74,10 +74,10 @@ def serve(
     if record is not None:
         say(f"{record}: {record.stat().st_size / 1e6:.2f} MB")
     if out is not None:
-        from ..run import write_outputs
+        from ..run import listing, write_outputs
 
         write_outputs(bridge.voyage.finish(), out)
-        say(f"{out}: episode.usv  ais.nmea  detections.csv  map.png  summary.json")
+        say(f"{out}: {listing(out)}")
     return report
 
 
