@@ -128,18 +128,19 @@ def test_rays_meet_land_where_all_edges_say(place, name):
     assert (ours < reach).mean() > 0.3
 
 
+@pytest.mark.parametrize("reach", [100.0, 1000.0, 6000.0], ids=["lidar", "in between", "radar"])
 @pytest.mark.parametrize("name", ["horten", "boston"])
-def test_the_nearest_land_of_a_sector_is_that_of_shapely(place, name):
+def test_the_nearest_land_of_a_sector_is_that_of_shapely(place, name, reach):
     _, land, pool = place(name)
     places = poses_near(land, 60, np.random.default_rng(5), 200.0)[:, :2]
     places = places[~shapely.contains_xy(land, places)][:25]
-    ours = sector_ranges(pool, places, 1000.0)
+    ours = sector_ranges(pool, places, reach)
     borders = np.arange(73) * np.pi / 36
     rays = np.column_stack([np.cos(borders), np.sin(borders)])
     for k, here in enumerate(places):
-        wedges = shapely.polygons([[here, here + 2000.0 * rays[i], here + 2000.0 * rays[i + 1]] for i in range(72)])
+        wedges = shapely.polygons([[here, here + 2.0 * reach * rays[i], here + 2.0 * reach * rays[i + 1]] for i in range(72)])
         true = shapely.distance(shapely.Point(here), shapely.intersection(wedges, land))
-        true[~(true <= 1000.0)] = np.nan  # what is empty is NaN
+        true[~(true <= reach)] = np.nan  # what is empty is NaN
         np.testing.assert_allclose(ours[k], true, atol=1e-7)
 
 
