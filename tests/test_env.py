@@ -449,7 +449,7 @@ def test_render_without_a_mode_says_what_to_do():
 def test_a_compilation_is_announced_and_nothing_else(capsys):
     import numba
 
-    from usv_gym.envs.notice import compiling
+    from usv_gym.jit import compiling
 
     function = numba.njit(lambda x: x + x)
     with compiling():

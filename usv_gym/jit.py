@@ -18,11 +18,13 @@ import functools
 import hashlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -92,3 +94,33 @@ def is_warm() -> bool:
     steps = Path(__file__).resolve().parent / "tasks"
     place = hashlib.sha1(str(steps).encode(), usedforsecurity=False).hexdigest()  # as numba names it
     return any((cache_directory() / f"{steps.name}_{place}").glob("*.nbc"))
+
+
+class _Notice(event.Listener):
+    """Speaks up at the first compilation that it sees."""
+
+    listening = False
+    told = False
+
+    def on_start(self, event: Any) -> None:
+        """Say it, once."""
+        if not self.told:
+            self.told = True
+            print("usv_gym: compiling kernels for this machine, once (about a minute) ...", file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        """Nothing."""
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Around anything that may compile: says so on stderr if it does, that is if its kernels are not on disk."""
+    if _Notice.listening:  # within another one
+        yield
+        return
+    _Notice.listening = True
+    try:
+        with event.install_listener("numba:compile", _Notice()):
+            yield
+    finally:
+        _Notice.listening = False

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .config import Document, validate
 from .envs.core import Core
-from .envs.notice import compiling
+from .jit import compiling
 from .policies import make_policy
 from .replay.archive import Episode
 from .replay.recorder import Recorder

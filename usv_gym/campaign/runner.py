@@ -20,8 +20,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from ..envs.notice import compiling
-from ..jit import is_warm
+from ..jit import compiling, is_warm
 from .controllers import last_words
 from .flight import FAILED, Flight, Result, Yard, batched, scenario_of
 

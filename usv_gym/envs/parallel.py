@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from ..config import ConfigError
+from ..jit import compiling
 from ..scenarios.build import build_worlds, track_pool, write_agent
 from ..scenarios.loader import load_scenario
 from ..tasks.step import BEGIN, STEP, run_batch
@@ -35,7 +36,6 @@ from ..world.land import NO_LAND
 from ..world.state import CAPACITIES
 from ..world.vessel import VesselModel, load_vessel
 from .core import NO_ROWS, vessel_facts
-from .notice import compiling
 
 MAX_AGENTS = 8  #: observers and plants of the record, so that every number of agents runs the same compiled kernel
 

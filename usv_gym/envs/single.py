@@ -12,12 +12,12 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from ..jit import compiling
 from ..scenarios.commands import Commands
 from ..scenarios.family_schema import Family
 from ..scenarios.loader import Source, load_scenario
 from ..tasks.task import task_config, unflatten
 from .core import Core
-from .notice import compiling
 
 _ONE = np.ones(1, np.bool_)
 

@@ -12,11 +12,11 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from ..jit import compiling
 from ..scenarios.commands import Commands
 from ..scenarios.loader import Source
 from ..tasks.task import task_config, unflatten
 from .core import Core, check_difficulty, check_weather, masked
-from .notice import compiling
 from .single import USVEnv, with_family
 
 Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..jit import compiling
 from ..replay.archive import replacing
 from .canvas import Canvas, load_pygame, text_size
 from .labels import Box, Placed, Request, place
@@ -63,6 +64,7 @@ class View:
         )
 
 
+@compiling()
 def render(
     scene: Scene,
     size: tuple[int, int] = (1180, 800),
@@ -80,6 +82,7 @@ def render(
     return image
 
 
+@compiling()
 def draw(
     scene: Scene,
     size: tuple[int, int] = (1180, 800),
