@@ -104,18 +104,22 @@ def echo_land(w, land, o, k, sensor, reach, tick, count, stream_noise, stream_de
                 _look_between(w, land, h, n, e, i, reach, count, echo)
     detection = sensor.detection * w.weather.detection_factor
     spread = sensor.gain * hypot(sensor.noise[0], sensor.bias[0])
+    pair, even, odd = -1, 0.0, 0.0
     for i in range(L):
-        r = hypot(echo[i, 0], echo[i, 1])
-        if not r > 0.0:
+        r2 = echo[i, 0] * echo[i, 0] + echo[i, 1] * echo[i, 1]
+        if not r2 > 0.0:
             continue
+        r = math.sqrt(r2)
         if detection < 1.0 and rng.uniform(w.seed, stream_detection, L * o + i, tick) >= detection:
             echo[i, 0] = echo[i, 1] = math.nan
             continue
-        error, _ = rng.normal2(w.seed, stream_noise, L * o + i, tick)
+        if i >> 1 != pair:  # two sectors share a draw of two numbers
+            pair = i >> 1
+            even, odd = rng.normal2(w.seed, stream_noise, L * o + pair, tick)
         seen = max(r, sensor.range_min)
-        measured = max(seen + spread * seen * error, 0.0)
-        echo[i, 0] = w.nav.position[o, 0] + echo[i, 0] * measured / r
-        echo[i, 1] = w.nav.position[o, 1] + echo[i, 1] * measured / r
+        stretch = max(seen + spread * seen * (odd if i & 1 else even), 0.0) / r
+        echo[i, 0] = w.nav.position[o, 0] + echo[i, 0] * stretch
+        echo[i, 1] = w.nav.position[o, 1] + echo[i, 1] * stretch
 
 
 @inner

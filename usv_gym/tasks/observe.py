@@ -267,9 +267,9 @@ def _observe_land(w, land, o, task, north, east, heading, obs):
         points = pic.chart[o] if chart else pic.land[o]
         for i in range(L):
             dn, de = points[i, 0] - north, points[i, 1] - east
-            distance = hypot(dn, de)
-            if distance == distance:
-                bearing, closeness = wrap(atan2(de, dn) - heading), 1.0 - distance / task.range_scale
+            closeness = 1.0 - hypot(dn, de) / task.range_scale
+            if closeness > 0.0:  # False where there is no point (NaN)
+                bearing = wrap(atan2(de, dn) - heading)
                 if n > 0:
                     _shade_sectors(obs, start + chart * n, n, bearing, half, closeness)
                 if chart == 0 and task.observation == OBS_SECTORS:

@@ -250,10 +250,15 @@ def _keep_nearest(land, begin, end, n, e, reach, out):
         if pn * pn + pe * pe > reach * reach:
             continue
         first = last if an == last_n and ae == last_e else sector_of(atan2(ae, an))
-        last, last_n, last_e = first if _in_sector(first, bn, be) else sector_of(atan2(be, bn)), bn, be
+        clockwise = an * be - ae * bn >= 0.0
+        last, last_n, last_e = first, bn, be
+        if not _in_sector(first, bn, be):
+            last = (first + 1 if first + 1 < L else 0) if clockwise else (first - 1 if first > 0 else L - 1)
+            if not _in_sector(last, bn, be):
+                last = sector_of(atan2(be, bn))
         if first == last:
             _keep(out, first, pn, pe)
-        elif an * be - ae * bn >= 0.0:  # a to b is clockwise
+        elif clockwise:
             _keep_parts(out, first, last, an, ae, bn, be)
         else:
             _keep_parts(out, last, first, bn, be, an, ae)
