@@ -58,6 +58,7 @@ class Duel:
         self.said.wait("failsafe_off", self.failures)
 
     def finish(self):
+        time.sleep(1.0)  # what came back last is told, and a busy machine may be behind its schedule
         self.running.send_signal(signal.SIGINT)
         assert self.running.wait(150) == 0  # what draws and judges may have to be compiled first
 
