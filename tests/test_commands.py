@@ -126,6 +126,31 @@ def test_an_object_that_is_moved_hits_nothing_on_the_way(sea):
     assert sea.env.world["safety"]["collided_with"][0] == -1
 
 
+def test_what_is_put_somewhere_within_a_traffic_frame_goes_on_from_there():
+    simulation = {"dt": 0.05, "traffic_interval": 1.0, "control_interval": 0.25}
+    env = ScenarioEnv({**SCENARIO, "simulation": simulation}, action="heading_speed")
+    env.reset(seed=1)
+    for _ in range(5):  # a quarter into the second frame
+        env.step(REST)
+    env.commands.spawn("ferry", {"speed": 8.0, "length": 40, "waypoints": [[300, 0], [900, 0]]})
+    env.commands.spawn("floe", {"position": [-200, 50], "radius": 5, "drift": [0.0, 2.0]})
+    env.commands.move("rower", -150.0, -80.0, 90.0)
+    places = {"ferry": (300.0, 0.0), "floe": (-200.0, 50.0), "rower": (-150.0, -80.0)}
+
+    def place(id):
+        source, vessels = env.commands.names.index(id), env.world["vessels"]["eta"]
+        objects = vessels[:, :2] if source < len(vessels) else env.world["obstacles"]["position"]
+        return objects[source if source < len(vessels) else source - len(vessels)].copy()
+
+    for id, there in places.items():
+        np.testing.assert_array_equal(place(id), there)
+    rowing = float(env.world["vessels"]["nu"][env.commands.names.index("rower"), 0])
+    env.step(REST)
+    np.testing.assert_allclose(place("ferry"), (302.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(place("floe"), (-200.0, 50.5), atol=1e-9)
+    np.testing.assert_allclose(place("rower"), (-150.0, -80.0 + 0.25 * rowing), atol=1e-9)
+
+
 def test_a_ship_takes_its_new_route_and_says_when_it_is_done(sea):
     north, east = sea.position("rower").tolist()
     sea.commands.set_waypoints("rower", [[north - 60, east], [north - 60, east - 120]])
