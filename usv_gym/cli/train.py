@@ -38,14 +38,20 @@ def train(
     console = Console()
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:,} of {task.total:,} steps"),
                TimeElapsedColumn(), TimeRemainingColumn())  # fmt: skip
+    said = 0
+
+    def tell(done: int, total: int, reward: float, success: float) -> None:
+        nonlocal said
+        description = f"return {reward:6.1f}  success {success:4.0%}" if reward == reward else "no episode is over yet"
+        bar.update(task, completed=done, total=total, description=description)
+        if not console.is_terminal and 10 * done // total > said:  # a log gets ten lines instead of a bar
+            said = 10 * done // total
+            console.print(f"{done:,} of {total:,} steps  {description}")
+
     try:
         with Progress(*columns, console=console, transient=True) as bar:
             task = bar.add_task("training", total=steps)
-            results = run_training(
-                training, steps, directory, resume=resume, episodes=episodes,
-                progress=lambda done, total, reward, success: bar.update(
-                    task, completed=done, total=total, description=f"return {reward:6.1f}  success {success:4.0%}"),
-            )  # fmt: skip
+            results = run_training(training, steps, directory, resume=resume, episodes=episodes, progress=tell)
     except KeyboardInterrupt:
         complain(KeyboardInterrupt(f"interrupted; {directory} has a checkpoint: go on with --resume"))
         raise typer.Exit(130) from None
