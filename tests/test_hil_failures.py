@@ -57,6 +57,14 @@ class Duel:
     def in_control(self):
         self.said.wait("failsafe_off", self.failures)
 
+    def through_death_and_silence(self):
+        """Nobody is there yet; a controller comes, is killed and started again, then says nothing for a while."""
+        self.lost()
+        self.begin()
+        self.kill()
+        self.begin()
+        self.silence()
+
     def finish(self):
         time.sleep(1.0)  # what came back last is told, and a busy machine may be behind its schedule
         self.running.send_signal(signal.SIGINT)
@@ -104,11 +112,7 @@ def test_ros1_survives_its_controller_its_network_and_its_master(ros1, tmp_path)
         lambda: spawn("/usr/bin/python3", EXAMPLES / "ros1_controller.py", "--route", *ROUTE, env=control),
     )
     try:
-        duel.lost()  # nobody is there yet
-        duel.begin()
-        duel.kill()
-        duel.begin()
-        duel.silence()
+        duel.through_death_and_silence()
         end(master)
         time.sleep(1.2)  # connections stand without it
         assert sum("failsafe_on" in line for line in duel.said.lines) == duel.failures
@@ -138,11 +142,7 @@ def test_ros2_survives_its_controller_and_its_network(ros2, tmp_path):
     """Real time: the controller is killed without a goodbye and started again; then nothing comes from it for a while."""
     duel = ros2_duel(*ros2, tmp_path)
     try:
-        duel.lost()  # nobody is there yet
-        duel.begin()
-        duel.kill()
-        duel.begin()
-        duel.silence()
+        duel.through_death_and_silence()
         duel.finish()
     finally:
         duel.close()
