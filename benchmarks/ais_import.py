@@ -32,6 +32,7 @@ from usv_gym.scenarios.ais_import.scene import Request, import_ais
 from usv_gym.scenarios.build import build_worlds, track_pool
 from usv_gym.scenarios.loader import load_scenario
 from usv_gym.world.land import NO_LAND
+from usv_gym.world.lanes import lanes_for
 
 SHIPS, EVERY = 2000, 10  # ships; seconds between two reports of each
 COLUMNS = ("# Timestamp,Type of mobile,MMSI,Latitude,Longitude,Navigational status,ROT,SOG,COG,Heading,IMO,Callsign,Name,"
@@ -103,7 +104,7 @@ def replay(path: Path, place: str, begin: str, seconds: int) -> dict[str, Any]:
         v = worlds["vessels"][0]
         for t in range(seconds + 1):
             if t:
-                advance_worlds(worlds, NO_LAND, tracks, 20, NO_ROWS)
+                advance_worlds(worlds, lanes_for(worlds), NO_LAND, tracks, 20, NO_ROWS)
             for k in range(len(some)):
                 if v["active"][1 + k]:
                     states[t, k] = *v["eta"][1 + k, :2], math.hypot(*v["velocity"][1 + k])

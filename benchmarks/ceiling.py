@@ -15,8 +15,9 @@ from numba import njit
 
 from usv_gym.scenarios.build import build_worlds
 from usv_gym.scenarios.loader import load_scenario
-from usv_gym.world.actuators import actuate
-from usv_gym.world.dynamics import plant_step
+from usv_gym.world.actuators import actuate, prepare_lags
+from usv_gym.world.dynamics import sail
+from usv_gym.world.lanes import LANES, clear, gather, lanes_for, scatter
 
 STEP = 0.1  # [s]
 FLAGS = ["-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-shared", "-fPIC"]
@@ -31,12 +32,19 @@ LAST = "memory memory_scale memory_den memory_num memory_x"
 
 
 @njit(fastmath={"contract"}, error_model="numpy", nogil=True)
-def _advance(worlds: Any, ticks: int, h: float) -> None:
-    for b in range(worlds.shape[0]):
-        w = worlds[b]
+def _advance(worlds: Any, lanes: Any, ticks: int, h: float) -> None:
+    for group in range(lanes.shape[0]):
+        g, first = lanes[group, 0], group * LANES
+        clear(g)
+        for l in range(min(LANES, worlds.shape[0] - first)):
+            worlds[first + l].dt = h
+            prepare_lags(worlds[first + l], 0, h)
+            gather(g, l, worlds[first + l], 0)
         for _ in range(ticks):
-            actuate(w, 0, h)
-            plant_step(w, 0, 0, h)
+            actuate(g)
+            sail(g)
+        for l in range(min(LANES, worlds.shape[0] - first)):
+            scatter(g, l, worlds[first + l], 0)
 
 
 def _ships(worlds: Any) -> Any:
@@ -79,13 +87,14 @@ def compare(seconds: float = 3.0, worlds: int = 64, vessel: str = "odin") -> dic
     command = start["plants"]["command"]
     command[:, 0, :, :2] = rng.uniform(-0.3, 0.9, command[:, 0, :, :2].shape)
     command[:, 0, :, 2] = 1.0
-    _advance(start, 1, STEP)  # compiles, and prepares the lags
+    lanes = lanes_for(start)
+    _advance(start, lanes, 1, STEP)  # compiles, and prepares the lags
     ours, theirs = start.copy(), _ships(start)
 
     def run_c(ticks: int) -> None:
         c.advance(theirs.ctypes.data, worlds, ticks, STEP)
 
-    _advance(ours, 300, STEP)
+    _advance(ours, lanes, 300, STEP)
     run_c(300)
     at = theirs.shape[1] - sum(int(np.prod(start["plants"][name].shape[2:])) for name in LAST.split()) - 8
     motion = np.concatenate([ours["vessels"]["eta"][:, 0], ours["vessels"]["nu"][:, 0]], 1)
@@ -93,7 +102,7 @@ def compare(seconds: float = 3.0, worlds: int = 64, vessel: str = "odin") -> dic
     best = [np.inf, np.inf]
     began = time.perf_counter()
     while time.perf_counter() - began < seconds:
-        for k, work in enumerate((lambda: _advance(ours, 100, STEP), lambda: run_c(100))):
+        for k, work in enumerate((lambda: _advance(ours, lanes, 100, STEP), lambda: run_c(100))):
             t = time.process_time()
             work()
             best[k] = min(best[k], (time.process_time() - t) / (100 * worlds))

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from usv_gym.jit import kernel
-from usv_gym.world.actuators import actuate
+from usv_gym.jit import inner, kernel
+from usv_gym.world.actuators import actuate, prepare_lags
 from usv_gym.world.autopilot import autopilot, mix
 from usv_gym.world.disturbance import set_weather, wave_step, weather_reset, weather_step
-from usv_gym.world.dynamics import plant_step
-from usv_gym.world.state import world_dtype
+from usv_gym.world.dynamics import sail
+from usv_gym.world.lanes import clear, gather, gather_command, lanes_for, scatter
+from usv_gym.world.state import MODEL_3DOF, world_dtype
 from usv_gym.world.vessel import VesselModel, load_vessel, write_plant
 
 GOLDEN = Path(__file__).parent / "golden" / "steady_motion.json"
@@ -34,6 +35,9 @@ def make_world(vessel="odin", preset="standard", memory=False, dt=0.05, seed=1, 
     """One world with one vessel at rest at the origin, heading north."""
     worlds = np.zeros(1, DTYPE)
     worlds["dt"], worlds["dt_us"], worlds["seed"] = dt, round(dt * 1e6), seed
+    worlds["vessels"]["active"][0, 0], worlds["vessels"]["model"][0, 0] = 1, MODEL_3DOF
+    worlds["vessels"]["plant"] = -1
+    worlds["vessels"]["plant"][0, 0] = 0
     write_plant(model(vessel), worlds, 0, 0, preset=preset, memory=memory)
     set_weather(worlds[0], original=preset == "original", **weather)
     reset(worlds)
@@ -45,61 +49,86 @@ def reset(worlds):
     weather_reset(worlds[0])
 
 
-@kernel
+@inner
+def board(g, w):
+    """Put the only world into the first lane of a group."""
+    clear(g)
+    prepare_lags(w, 0, w.dt)
+    gather(g, 0, w, 0)
+
+
+@inner
+def write(g, out):
+    for k in range(3):
+        out[k] = g.eta[k, 0]
+        out[3 + k] = g.nu[k, 0]
+
+
 def run(worlds, ticks, out):
     """Hold the commands for some ticks; out [ticks, 6] gets eta and nu."""
-    w = worlds[0]
-    for i in range(ticks):
-        weather_step(w, w.tick)
-        actuate(w, 0, w.dt)
-        wave_step(w, 0, 0, w.tick)
-        plant_step(w, 0, 0, w.dt)
-        w.tick += 1
-        if i < out.shape[0]:
-            for k in range(3):
-                out[i, k] = w.vessels.eta[0, k]
-                out[i, 3 + k] = w.vessels.nu[0, k]
+    _run(worlds, lanes_for(worlds)[0], ticks, out)
 
 
 @kernel
+def _run(worlds, lanes, ticks, out):
+    w, g = worlds[0], lanes[0]
+    board(g, w)
+    for i in range(ticks):
+        weather_step(g)
+        actuate(g)
+        wave_step(g)
+        sail(g)
+        if i < out.shape[0]:
+            write(g, out[i])
+    scatter(g, 0, w, 0)
+
+
 def replay(worlds, commands, rows, wind, current, out):
     """Each tick: some command rows, one actuator call each, with wind [ticks, 2] and current [ticks, 2] prescribed."""
-    w = worlds[0]
+    _replay(worlds, lanes_for(worlds)[0], commands, rows, wind, current, out)
+
+
+@kernel
+def _replay(worlds, lanes, commands, rows, wind, current, out):
+    w, g = worlds[0], lanes[0]
+    board(g, w)
     for i in range(out.shape[0]):
-        for k in range(3):
-            out[i, k] = w.vessels.eta[0, k]
-            out[i, 3 + k] = w.vessels.nu[0, k]
+        write(g, out[i])
         for row in range(rows * i, rows * i + rows):
             if row < commands.shape[0]:
                 for side in range(2):
                     for k in range(3):
-                        w.plants.command[0, side, k] = commands[row, side, k]
-                actuate(w, 0, w.dt)
+                        g.command[side, k, 0] = commands[row, side, k]
+                actuate(g)
         if i < wind.shape[0]:
-            w.weather.wind_u10 = wind[i, 0]
-            w.weather.wind_direction = wind[i, 1]
-            w.weather.current[0] = current[i, 0]
-            w.weather.current[1] = current[i, 1]
-        plant_step(w, 0, 0, w.dt)
+            g.wind_u10[0] = wind[i, 0]
+            g.wind_direction[0] = wind[i, 1]
+            g.current[0, 0] = current[i, 0]
+            g.current[1, 0] = current[i, 1]
+        sail(g)
+    scatter(g, 0, w, 0)
+
+
+def steer(worlds, heading_ref, speed_ref, ticks, every, out):
+    """Autopilot on exact measurements, called every few ticks; out [ticks, 6]."""
+    _steer(worlds, lanes_for(worlds)[0], heading_ref, speed_ref, ticks, every, out)
 
 
 @kernel
-def steer(worlds, heading_ref, speed_ref, ticks, every, out):
-    """Autopilot on exact measurements, called every few ticks; out [ticks, 6]."""
-    w = worlds[0]
+def _steer(worlds, lanes, heading_ref, speed_ref, ticks, every, out):
+    w, g = worlds[0], lanes[0]
+    board(g, w)
     for i in range(ticks):
-        weather_step(w, w.tick)
         if i % every == 0:
-            nu = w.vessels.nu
-            surge, yaw = autopilot(w, 0, w.vessels.eta[0, 2], nu[0, 2], nu[0, 0], heading_ref, speed_ref, w.dt * every)
+            surge, yaw = autopilot(w, 0, g.eta[2, 0], g.nu[2, 0], g.nu[0, 0], heading_ref, speed_ref, w.dt * every)
             mix(w, 0, surge, yaw)
-        actuate(w, 0, w.dt)
-        wave_step(w, 0, 0, w.tick)
-        plant_step(w, 0, 0, w.dt)
-        w.tick += 1
-        for k in range(3):
-            out[i, k] = w.vessels.eta[0, k]
-            out[i, 3 + k] = w.vessels.nu[0, k]
+            gather_command(g, 0, w, 0)
+        weather_step(g)
+        actuate(g)
+        wave_step(g)
+        sail(g)
+        write(g, out[i])
+    scatter(g, 0, w, 0)
 
 
 def simulate(worlds, seconds, *, command=None):

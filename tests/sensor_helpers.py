@@ -12,6 +12,7 @@ from usv_gym.scenarios.build import build_worlds
 from usv_gym.scenarios.loader import load_scenario
 from usv_gym.traffic.replay import NO_TRACKS
 from usv_gym.world.land import NO_LAND
+from usv_gym.world.lanes import lanes_for
 from usv_gym.world.state import MODEL_KINEMATIC
 
 V = 8  #: vessel slots of the worlds below: obstacle i is source V + i
@@ -41,7 +42,7 @@ def advance(worlds, seconds):
     """Sail on for a time that is a whole number of ticks."""
     ticks = round(seconds / worlds["dt"][0])
     assert abs(ticks * worlds["dt"][0] - seconds) < 1e-9
-    advance_worlds(worlds, NO_LAND, NO_TRACKS, ticks, NO_ROWS)
+    advance_worlds(worlds, lanes_for(worlds), NO_LAND, NO_TRACKS, ticks, NO_ROWS)
 
 
 def watch(worlds, seconds, every, *paths):

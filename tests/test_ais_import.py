@@ -32,6 +32,7 @@ from usv_gym.scenarios.build import build_worlds, track_pool
 from usv_gym.scenarios.loader import load_scenario
 from usv_gym.units import KNOT
 from usv_gym.world.land import NO_LAND
+from usv_gym.world.lanes import lanes_for
 
 EVERYWHERE = Selection(0.0, 0.0, 3e7)
 NO_ROWS = np.zeros((0, 0, 4, 3))
@@ -233,7 +234,7 @@ def sailed(whole, seconds):
         slots = slice(1, 1 + len(some))
         for t in range(seconds + 1):
             if t:
-                advance_worlds(worlds, NO_LAND, tracks, 20, NO_ROWS)
+                advance_worlds(worlds, lanes_for(worlds), NO_LAND, tracks, 20, NO_ROWS)
             v = worlds["vessels"][0]
             there = v["active"][slots] != 0
             out[t, first : first + 7][there] = v["eta"][slots, :2][there]

@@ -4,44 +4,48 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dynamics_helpers import make_world, simulate
+from dynamics_helpers import board, make_world, simulate
 
 from usv_gym.jit import kernel
 from usv_gym.world.disturbance import wave_step, weather_step
+from usv_gym.world.lanes import lanes_for
 
 SECONDS = 100_000
 
 
 @kernel
-def wave_series(worlds, ticks, speed, out):
+def wave_series(worlds, lanes, ticks, speed, out):
     """Spread of the unit wave states [3, 2] over some ticks, at a constant speed over ground."""
-    w = worlds[0]
+    g = lanes[0]
+    board(g, worlds[0])
     for i in range(ticks):
-        w.vessels.nu[0, 0] = speed
-        wave_step(w, 0, 0, i)
+        g.nu[0, 0] = speed
+        g.tick[0] = i
+        wave_step(g)
         for dof in range(3):
             for k in range(2):
-                out[dof, k] += w.plants.wave_x[0, dof, k] ** 2
-            out[dof, 2] += w.plants.wave_x[0, dof, 1] * w.plants.wave_x[0, (dof + 1) % 3, 1]
+                out[dof, k] += g.wave_x[dof, k, 0] ** 2
+            out[dof, 2] += g.wave_x[dof, 1, 0] * g.wave_x[(dof + 1) % 3, 1, 0]
 
 
 @kernel
-def weather_series(worlds, out):
+def weather_series(worlds, lanes, out):
     """Out [ticks, 4]: wind [m/s] and direction [rad], current N and E [m/s]."""
-    w = worlds[0]
+    g = lanes[0]
+    board(g, worlds[0])
     for i in range(out.shape[0]):
-        weather_step(w, i)
-        out[i, 0] = w.weather.wind_u10
-        out[i, 1] = w.weather.wind_direction
-        out[i, 2] = w.weather.current[0]
-        out[i, 3] = w.weather.current[1]
+        weather_step(g)
+        out[i, 0] = g.wind_u10[0]
+        out[i, 1] = g.wind_direction[0]
+        out[i, 2] = g.current[0, 0]
+        out[i, 3] = g.current[1, 0]
 
 
 def wave_force_std(dt, *, speed=0.0, to=0.0, **kw):
     worlds = make_world(dt=dt, wave_height=2.0, wave_to=to, **kw)
     ticks = round(SECONDS / dt)
     sums = np.zeros((3, 3))
-    wave_series(worlds, ticks, speed, sums)
+    wave_series(worlds, lanes_for(worlds)[0], ticks, speed, sums)
     scale = worlds["weather"]["wave_scale"][0] * worlds["plants"]["wave_gain"][0, 0]
     return scale * np.sqrt(sums[:, 1] / ticks), sums / ticks
 
@@ -78,7 +82,7 @@ def test_wave_force_directions():
 def test_wind_and_current_spread(dt):
     worlds = make_world(dt=dt, wind_speed=15.0, wind_to=1.0, current_speed=0.5, current_to=2.0)
     out = np.zeros((round(SECONDS / dt), 4))
-    weather_series(worlds, out)
+    weather_series(worlds, lanes_for(worlds)[0], out)
     wind = out[:, 0] - 15.0
     assert abs(wind.mean()) < 0.1
     assert wind.std() == pytest.approx(np.hypot(1.8, 0.5), rel=0.03)
@@ -94,17 +98,18 @@ def test_wind_and_current_spread(dt):
 def test_original_wind_and_current_spread():
     worlds = make_world(preset="original", wind_speed=15.0, wind_to=1.0, current_speed=0.5, current_to=2.0)
     out = np.zeros((round(SECONDS / 0.05), 4))
-    weather_series(worlds, out)
+    weather_series(worlds, lanes_for(worlds)[0], out)
     assert (out[:, 0] - 15.0).std() == pytest.approx(np.hypot(1.8, 0.5), rel=0.05)
     assert np.hypot(out[:, 2], out[:, 3]).std() == pytest.approx(0.114, rel=0.05)
 
 
 def test_steady_and_calm_weather():
     out = np.zeros((100, 4))
-    weather_series(make_world(wind_speed=7.0, wind_to=1.0, current_speed=0.5, current_to=0.0, gusts=False), out)
+    worlds = make_world(wind_speed=7.0, wind_to=1.0, current_speed=0.5, current_to=0.0, gusts=False)
+    weather_series(worlds, lanes_for(worlds)[0], out)
     np.testing.assert_allclose(out, np.tile((7.0, 1.0, 0.5, 0.0), (100, 1)), atol=1e-15)
     worlds = make_world()
-    weather_series(worlds, out)
+    weather_series(worlds, lanes_for(worlds)[0], out)
     assert not out[:, [0, 2, 3]].any()
     assert not simulate(worlds, 1.0, command=[[0.0, 0.0, 0.0]] * 4).any()
 

@@ -23,6 +23,7 @@ from usv_gym.scenarios.loader import load_scenario
 from usv_gym.traffic.replay import NO_TRACKS
 from usv_gym.world.encounter import Encounter, encounters
 from usv_gym.world.land import NO_LAND
+from usv_gym.world.lanes import lanes_for
 
 NO_ROWS = np.zeros((0, 0, 4, 3))
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "scenarios.md"
@@ -81,7 +82,7 @@ def test_in_motion_it_is_the_same():
     last = float(asked["tcpa"].max())
     places = [v["eta"][:, :n, :2].copy()]
     for _ in range(math.ceil(last / 0.5) + 2):
-        advance_worlds(worlds, NO_LAND, NO_TRACKS, 5, NO_ROWS)
+        advance_worlds(worlds, lanes_for(worlds), NO_LAND, NO_TRACKS, 5, NO_ROWS)
         places.append(v["eta"][:, :n, :2].copy())
     track = np.array(places)  # [T, B, n, 2], every half second
     for i in range(n):

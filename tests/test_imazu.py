@@ -19,6 +19,7 @@ from usv_gym.traffic.replay import NO_TRACKS
 from usv_gym.units import KNOT
 from usv_gym.world.encounter import Encounter, encounters
 from usv_gym.world.land import NO_LAND
+from usv_gym.world.lanes import lanes_for
 from usv_gym.world.vessel import load_vessel
 
 CASES = imazu_cases()
@@ -52,7 +53,7 @@ def test_every_ship_is_at_the_meeting_point_at_the_time(size):
     worlds["sensors"]["exteroceptive"] = 0
     start = worlds["vessels"]["eta"].copy()
     reset_worlds(worlds, NO_LAND, NO_TRACKS, np.ones(len(worlds), np.bool_))
-    advance_worlds(worlds, NO_LAND, NO_TRACKS, round(time / scenario.simulation.dt), np.zeros((0, 0, 4, 3)))
+    advance_worlds(worlds, lanes_for(worlds), NO_LAND, NO_TRACKS, round(time / scenario.simulation.dt), np.zeros((0, 0, 4, 3)))
     v = worlds["vessels"]
     ships = v["active"].astype(bool)
     ships[:, 0] = False

@@ -18,6 +18,7 @@ from usv_gym.scenarios.loader import load_scenario
 from usv_gym.scenarios.tracks import write_tracks
 from usv_gym.units import DEG
 from usv_gym.world.land import NO_LAND
+from usv_gym.world.lanes import lanes_for
 from usv_gym.world.state import BEHAVIOUR_HOLD, BEHAVIOUR_REPLAY
 
 NO_ROWS = np.zeros((0, 0, 4, 3))
@@ -43,7 +44,7 @@ def sea(track=CURVE, *, own=(-5000.0, 0.0), **keys):
 
 
 def sail(worlds, tracks, seconds):
-    advance_worlds(worlds, NO_LAND, tracks, round(seconds / 0.05), NO_ROWS)
+    advance_worlds(worlds, lanes_for(worlds), NO_LAND, tracks, round(seconds / 0.05), NO_ROWS)
 
 
 def as_track(parts):

@@ -270,7 +270,7 @@ def test_a_crew_does_every_row_once():
             count[part] += 1
 
         for _ in range(20):
-            crew.share(rows, work)
+            crew.share(rows, 8, work)
         assert (count == 20).all()
         crew.close()
 
@@ -282,7 +282,7 @@ def test_a_crew_hands_on_errors():
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        crew.share(100, work)
+        crew.share(100, 8, work)
     crew.close()
 
 

@@ -1,5 +1,7 @@
 """One tick of a world, and the entry points that advance a batch.
 
+Weather and plants of eight worlds advance together (world/lanes.py), the rest of a world by itself, when it is due.
+
 Order within a tick: weather, actuators, own-ship dynamics; at the end of a traffic frame the traffic, the collision sweep and
 the next frame's decisions; then the sensors that are due.  What a sensor sees is therefore the world at its own tick.
 """
@@ -9,45 +11,72 @@ from __future__ import annotations
 import math
 
 from .events import run_events
-from .jit import lean_kernel, spliced
+from .jit import inner, lean_kernel, spliced
 from .sensors.nav import navigate
 from .sensors.schedule import first_events, sense
 from .traffic.replay import begin_replay, replay
 from .traffic.ships import follow_route, move_traffic, steer
-from .world.actuators import actuate
+from .world.actuators import actuate, prepare_lags
 from .world.disturbance import wave_step, weather_reset, weather_step
-from .world.dynamics import plant_step
+from .world.dynamics import sail
+from .world.lanes import LANES, clear, gather, scatter, scatter_motion
 from .world.safety import begin_frame, sweep
 from .world.state import MODEL_3DOF
 
 
 @spliced
-def tick_world(w, land, tracks, rows, row):
-    """Advance one world by one tick; ``land`` and ``tracks`` are the pools of world/land.py and traffic/replay.py.
+def board(lanes, l, w, n):
+    """Copy all plants of world w into lane l of its group; n command rows arrive within a tick for plant 0 (0: none)."""
+    for p in range(lanes.shape[0]):
+        prepare_lags(w, p, w.dt / n if p == 0 and n > 0 else w.dt)
+        gather(lanes[p], l, w, p)
+    lanes[0].under_way[l] = 1
+    lanes[0].due[l] = _due(w)
+
+
+@inner
+def _due(w):
+    """First tick at which anything besides the plants happens in a world."""
+    return min(w.frame_tick + w.frame_ticks, w.next_nav, w.next_sense)
+
+
+@spliced
+def tick_lanes(lanes, rows, row):
+    """Advance weather and plants of a group by one tick.
 
     ``rows[row]`` [n, A, 3] are commands to plant 0 that arrive within the tick, in order (a thrust log faster than the
-    tick); with n = 0 the command in the record holds.
+    tick); with n = 0 the commands in the lanes hold.
     """
-    w.tick += 1
+    for p in range(lanes.shape[0]):
+        g = lanes[p]
+        if p > 0 and g.any_plant == 0:
+            continue
+        weather_step(g)
+        if g.any_plant == 0:
+            continue
+        if rows.shape[1] > 0 and p == 0:
+            for i in range(rows.shape[1]):
+                for a in range(rows.shape[2]):
+                    for c in range(3):
+                        for l in range(LANES):
+                            g.command[a, c, l] = rows[row, i, a, c]
+                actuate(g)
+        else:
+            actuate(g)
+        wave_step(g)
+        sail(g)
+
+
+@spliced
+def attend(lanes, l, w, land, tracks):
+    """Do what is due at this tick in world w, whose lane is l: end of the traffic frame, navigation, sensors."""
+    eventful = w.events_left > 0  # an event may do anything to a plant
+    if eventful:
+        disembark(lanes, l, w)
+    else:
+        for p in range(lanes.shape[0]):
+            scatter_motion(lanes[p], l, w)
     tick = w.tick
-    if w.weather.on:
-        weather_step(w, tick)
-    v = w.vessels
-    for j in range(v.active.shape[0]):
-        if v.active[j] and v.model[j] == MODEL_3DOF:
-            p = v.plant[j]
-            if rows.shape[1] > 0 and p == 0:
-                n = rows.shape[1]
-                for i in range(n):
-                    for a in range(rows.shape[2]):
-                        for c in range(3):
-                            w.plants.command[0, a, c] = rows[row, i, a, c]
-                    actuate(w, p, w.dt / n)
-            else:
-                actuate(w, p, w.dt)
-            if w.weather.on:
-                wave_step(w, p, j, tick)
-            plant_step(w, j, p, w.dt)
     if tick - w.frame_tick >= w.frame_ticks:
         end_frame(w, land, tracks)
     if tick >= w.next_nav:
@@ -58,6 +87,17 @@ def tick_world(w, land, tracks, rows, row):
     if tick >= w.next_sense:
         move_traffic(w, tick)
         sense(w, land, tick)
+    if eventful:
+        for p in range(lanes.shape[0]):
+            gather(lanes[p], l, w, p)
+    lanes[0].due[l] = _due(w)
+
+
+@spliced
+def disembark(lanes, l, w):
+    """Write what has become of lane l into its world."""
+    for p in range(lanes.shape[0]):
+        scatter(lanes[p], l, w, p)
 
 
 @spliced
@@ -106,15 +146,26 @@ def reset_worlds(worlds, land, tracks, mask):
 
 
 @lean_kernel
-def advance_worlds(worlds, land, tracks, ticks, rows):
-    """Advance every world by ``ticks``; ``land`` and ``tracks`` are the pools of ``reset_worlds``.
+def advance_worlds(worlds, lanes, land, tracks, ticks, rows):
+    """Advance every world by ``ticks``; ``land`` and ``tracks`` are the pools of ``reset_worlds``, lanes ``lanes_for(worlds)``.
 
     rows: float64 [ticks, n, A, 3], commands to plant 0 of every world, n of them within each tick; [0, 0, A, 3] to let the
     commands in the records hold.
     """
-    for b in range(worlds.shape[0]):
+    for first in range(0, worlds.shape[0], LANES):
+        group = lanes[first // LANES]
+        some = min(worlds.shape[0] - first, LANES)
+        for p in range(group.shape[0]):
+            clear(group[p])
+        for l in range(some):
+            board(group, l, worlds[first + l], rows.shape[1])
         for k in range(ticks):
-            tick_world(worlds[b], land, tracks, rows, k)
+            tick_lanes(group, rows, k)
+            for l in range(some):
+                if group[0].tick[l] >= group[0].due[l]:
+                    attend(group, l, worlds[first + l], land, tracks)
+        for l in range(some):
+            disembark(group, l, worlds[first + l])
 
 
 @lean_kernel

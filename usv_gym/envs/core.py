@@ -37,6 +37,7 @@ from ..tasks.task import (
 from ..units import DEG
 from ..world.disturbance import set_weather
 from ..world.land import Coast, land_pool
+from ..world.lanes import LANES, lanes_for
 from ..world.state import A, capacity
 from ..world.vessel import VesselModel, load_vessel
 from .threads import Crew
@@ -179,6 +180,7 @@ class Core:
         self.worlds, self.names, self.action_space, self.config = worlds, names, space, config
         self.coasts, self.land = coasts, land_pool(coasts)
         self.tracks = track_pool(scenario)
+        self._lanes = lanes_for(worlds)
         self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation
         self.control_interval = simulation.control_ticks * simulation.dt
@@ -298,9 +300,12 @@ class Core:
 
     def _run(self, rows: NDArray[np.float64]) -> int:
         if self.crew.size == 1 or np.count_nonzero(self._what) < _WORTH_SHARING or not self._plausible():
-            return int(run_batch(self.worlds, self.land, self.tracks, self.task, self._episodes, self._obs, rows))
-        self.crew.share(self.num, lambda part: run_batch(self.worlds[part], self.land, self.tracks, self.task,
-                                                         self._episodes[part], self._obs[part], rows))  # fmt: skip
+            return int(
+                run_batch(self.worlds, self._lanes, self.land, self.tracks, self.task, self._episodes, self._obs, rows)
+            )
+        self.crew.share(self.num, LANES, lambda part: run_batch(
+            self.worlds[part], self._lanes[part.start // LANES :], self.land, self.tracks, self.task, self._episodes[part],
+            self._obs[part], rows))  # fmt: skip
         return -1
 
     def _plausible(self) -> bool:

@@ -33,6 +33,7 @@ from ..tasks.task import (
     unflatten,
 )
 from ..world.land import NO_LAND
+from ..world.lanes import lanes_for
 from ..world.state import CAPACITIES
 from ..world.vessel import VesselModel, load_vessel
 from .core import NO_ROWS, vessel_facts
@@ -123,6 +124,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self.worlds, self.names = build_worlds(
             self.scenario, 1, capacity=(V, M), observers=range(MAX_AGENTS), agents=MAX_AGENTS
         )
+        self._lanes = lanes_for(self.worlds)
         self._tracks = track_pool(self.scenario)
         self._template = self.worlds.copy()
         self._obs = np.zeros((1, MAX_AGENTS, observation_size(config)), np.float32)
@@ -154,7 +156,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self._draw(self._rng)
         self._episodes["what"] = BEGIN
         with compiling():
-            run_batch(self.worlds, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS)
+            run_batch(self.worlds, self._lanes, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS)
         self.agents = list(self.possible_agents)
         return self._observations(self.agents), {agent: {"scales": self._scales(agent)} for agent in self.agents}
 
@@ -179,7 +181,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
             width = int(self._tasks["channels"][self._slot[agent]])
             episodes["action"][self._slot[agent], :width] = action
         self._episodes["what"] = STEP
-        if run_batch(self.worlds, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS) >= 0:
+        if run_batch(self.worlds, self._lanes, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS) >= 0:
             raise ValueError(f"actions {dict(actions)!r}: expected finite numbers, and whole ones from 0 to 4 for discrete")
         slots = {agent: self._slot[agent] for agent in here}
         rewards = {agent: float(episodes["reward"][k]) for agent, k in slots.items()}

@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 #: chunks of rows per thread: enough that a thread which the machine holds up costs little
 _CHUNKS = 4
-_SMALLEST = 8  # rows of a chunk
 
 
 class Crew:
@@ -25,9 +24,12 @@ class Crew:
         self._pool: ThreadPoolExecutor | None = None
         self._process = 0
 
-    def share(self, rows: int, work: Callable[[slice], object]) -> None:
-        """Call ``work`` on slices that cover ``range(rows)``; each thread takes the next one when it is done with its last."""
-        chunk = max(-(-rows // (_CHUNKS * self.size)), _SMALLEST)
+    def share(self, rows: int, unit: int, work: Callable[[slice], object]) -> None:
+        """Call ``work`` on slices that cover ``range(rows)``, all but the last a multiple of ``unit`` rows.
+
+        Each thread takes the next slice when it is done with its last.
+        """
+        chunk = -(-rows // (_CHUNKS * self.size * unit)) * unit
         left = deque(slice(low, min(low + chunk, rows)) for low in range(0, rows, chunk))
 
         def labour() -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 from ..colregs.duty import rule_terms
-from ..engine import reset_world, tick_world
+from ..engine import attend, board, disembark, reset_world, tick_lanes
 from ..jit import inner, lean_kernel, spliced
 from ..traffic.ships import move_traffic
 from ..trig import clip, hypot, wrap
 from ..units import DEG
 from ..world.autopilot import autopilot, mix
+from ..world.lanes import LANES, clear, gather_command
 from .observe import cross_track_error, observe
 from .task import ACTION_CHANNELS, ACTION_DEMAND, ACTION_DISCRETE, DISCRETE, HEADING_SPAN
 
@@ -146,18 +147,10 @@ def _judge(w, o, task, episode):
     episode.truncated = truncated
 
 
-@spliced
-def step_task(w, land, tracks, tasks, episodes, rows):
-    """One control step of a world: every observer's action, the ticks, every observer's judgement.
-
-    Observers whose vessel has left the sea do nothing.  A lone observer's step ends where its vessel collides or runs aground.
-    """
-    O = w.observer.shape[0]
-    piloted = tasks[0].action != ACTION_DEMAND and tasks[0].action != ACTION_CHANNELS
-    if w.sensors.exteroceptive == 0 and not piloted:
-        # nobody reads the own navigation before the step is over, so it is not measured before
-        w.next_nav = max(w.next_nav, w.tick + tasks[0].control_ticks)
-    for o in range(O):
+@inner
+def _take_actions(w, tasks, episodes):
+    """Begin the control step of a world: what every observer asks for."""
+    for o in range(w.observer.shape[0]):
         own = w.observer[o]
         w.safety.step_closest[o] = math.inf
         episodes[o].collided = w.safety.collided_with[o] >= 0
@@ -165,18 +158,59 @@ def step_task(w, land, tracks, tasks, episodes, rows):
         episodes[o].arrived = w.routes.done[own] != 0
         if w.vessels.active[own]:
             episodes[o].change = _decode(w, o, tasks[o], episodes[o])
-    for k in range(tasks[0].control_ticks):
+
+
+@spliced
+def step_group(worlds, lanes, land, tracks, tasks, episodes, rows):
+    """One control step of up to LANES worlds: every observer's action, the ticks, every observer's judgement.
+
+    Observers whose vessel has left the sea do nothing.  A lone observer's step ends where its vessel collides or runs aground.
+    """
+    task, crew = tasks[0], lanes[0]
+    piloted = task.action != ACTION_DEMAND and task.action != ACTION_CHANNELS
+    left = 0
+    for p in range(lanes.shape[0]):
+        clear(lanes[p])
+    for l in range(worlds.shape[0]):
+        if episodes[l, 0].what == STEP:
+            w = worlds[l]
+            if w.sensors.exteroceptive == 0 and not piloted:
+                # nobody reads the own navigation before the step is over, so it is not measured before
+                w.next_nav = max(w.next_nav, w.tick + task.control_ticks)
+            _take_actions(w, tasks, episodes[l])
+            board(lanes, l, w, rows.shape[1])
+            left += 1
+    for k in range(task.control_ticks if left > 0 else 0):
         if piloted:
-            for o in range(O):
-                if w.vessels.active[w.observer[o]]:
-                    _pilot(w, o, tasks[o], episodes[o])
-        tick_world(w, land, tracks, rows, k)
-        if O == 1 and tasks[0].end_on_collision and (w.safety.collided_with[0] >= 0 or w.safety.grounded[0]):
+            for l in range(worlds.shape[0]):
+                if crew.under_way[l]:
+                    w = worlds[l]
+                    for o in range(w.observer.shape[0]):
+                        if w.vessels.active[w.observer[o]]:
+                            _pilot(w, o, tasks[o], episodes[l, o])
+                    for p in range(lanes.shape[0]):
+                        gather_command(lanes[p], l, w, p)
+        tick_lanes(lanes, rows, k)
+        for l in range(worlds.shape[0]):
+            if crew.under_way[l] and crew.tick[l] >= crew.due[l]:
+                w = worlds[l]
+                attend(lanes, l, w, land, tracks)
+                hit = w.safety.collided_with[0] >= 0 or w.safety.grounded[0] != 0
+                if hit and w.observer.shape[0] == 1 and task.end_on_collision:
+                    disembark(lanes, l, w)
+                    crew.under_way[l] = 0
+                    left -= 1
+        if left == 0:
             break
-    move_traffic(w, w.tick)
-    for o in range(O):
-        if w.vessels.active[w.observer[o]]:
-            _judge(w, o, tasks[o], episodes[o])
+    for l in range(worlds.shape[0]):
+        if episodes[l, 0].what == STEP:
+            w = worlds[l]
+            if crew.under_way[l]:
+                disembark(lanes, l, w)
+            move_traffic(w, w.tick)
+            for o in range(w.observer.shape[0]):
+                if w.vessels.active[w.observer[o]]:
+                    _judge(w, o, tasks[o], episodes[l, o])
 
 
 BEGIN, STEP = 1, 2  #: what ``run_batch`` does with a row
@@ -194,10 +228,10 @@ def _possible(task, action):
 
 
 @lean_kernel
-def run_batch(worlds, land, tracks, tasks, episodes, obs, rows):
+def run_batch(worlds, lanes, land, tracks, tasks, episodes, obs, rows):
     """Begin an episode in the rows that ask for BEGIN, make a control step in those that ask for STEP, leave the others.
 
-    worlds [B]; land, the pool that their ``land_id`` count in (world/land.py); tasks [O], one per observer; episodes [B, O]
+    worlds [B]; lanes, the room that ``lanes_for(worlds)`` makes; land, the pool that their ``land_id`` count in (world/land.py); tasks [O], one per observer; episodes [B, O]
     with ``what`` (of observer 0) and ``action`` as input and the rest as result; obs [B, O, size] float32, written;
     rows [ticks, n, A, 3] (see engine.advance_worlds).
     Returns -1, or the first row with an action that is not finite or none of ``discrete``; then nothing at all has moved.
@@ -210,14 +244,15 @@ def run_batch(worlds, land, tracks, tasks, episodes, obs, rows):
                 if worlds[b].vessels.active[worlds[b].observer[o]] and not _possible(tasks[o], episodes[b, o].action):
                     return b
     for b in range(worlds.shape[0]):
-        what = episodes[b, 0].what
-        if what == BEGIN:
+        if episodes[b, 0].what == BEGIN:
             begin_episodes(worlds[b], land, tracks, tasks, episodes[b])
-        elif what == STEP:
-            step_task(worlds[b], land, tracks, tasks, episodes[b], rows)
-        if what != 0:
-            for o in range(O):
-                observe(worlds[b], land, o, tasks[o], obs[b, o])
+    for first in range(0, worlds.shape[0], LANES):
+        last = min(first + LANES, worlds.shape[0])
+        step_group(worlds[first:last], lanes[first // LANES], land, tracks, tasks, episodes[first:last], rows)
+        for b in range(first, last):
+            if episodes[b, 0].what != 0:
+                for o in range(O):
+                    observe(worlds[b], land, o, tasks[o], obs[b, o])
     return -1
 
 

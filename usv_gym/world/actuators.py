@@ -2,48 +2,30 @@
 
 Each thruster has three first-order lags: shaft speed n [rpm], nozzle angle alpha [rad] and bucket beta (a waterjet's
 reversing deflector, +1 ahead, -1 astern).  A fixed propeller is a thruster without nozzle and bucket; a bow thruster is
-a fixed propeller that points sideways.
+a fixed propeller that points sideways.  g: a group of lanes (lanes.py).
 """
 
 from __future__ import annotations
 
 import math
 
-from ..jit import inner
-from ..trig import clip, sincos
+from ..jit import inner, scalar
+from ..trig import clip, sincos_random
+from .lanes import LANES
 
 EULER_STEP = 0.05  #: [s] step per command row of the preset `original`
 
 
 @inner
-def actuate(w, p, h):
-    """Advance shaft speed, nozzle and bucket of plant p by h seconds towards ``plants.command[p]`` ([A, 3] in [-1, 1]).
+def prepare_lags(w, p, h):
+    """Write which share of the way to its reference each lag of plant p covers in h seconds, before lanes are gathered.
 
-    The lag is exact for a constant command, x <- x + (1 - exp(-h / T)) (x_ref - x).  With ``euler_actuators`` every
-    call is one explicit Euler step of 0.05 s, whatever h is: the original stepped its actuators once per message.
-    Demands beyond [-1, 1] saturate; NaN is for the caller to refuse.
+    The lag is exact for a constant command, 1 - exp(-h / T).  With ``euler_actuators`` every call of ``actuate`` is one explicit
+    Euler step of 0.05 s, whatever h is: the original stepped its actuators once per message.
     """
     q = w.plants
-    if q.lag_step[p] != h:
-        _prepare_lags(w, p, h)
-    for i in range(q.thrusters[p]):
-        demand = clip(q.command[p, i, 0], -1.0, 1.0)
-        idle = q.n_idle[p, i]
-        span = q.n_max[p, i] - idle if demand >= 0.0 else idle - q.n_min[p, i]
-        if q.jet_stuck[p, i] == 0:
-            q.n[p, i] += q.lag[p, i, 0] * (idle + demand * span - q.n[p, i])
-        if q.nozzle_stuck[p, i] == 0:
-            # a nozzle that points to port pushes the stern to port and the bow to starboard
-            alpha = -q.nozzle_max[p, i] * clip(q.command[p, i, 1], -1.0, 1.0)
-            q.alpha[p, i] += q.lag[p, i, 1] * (alpha - q.alpha[p, i])
-        if q.bucket[p, i] != 0 and q.jet_stuck[p, i] == 0:
-            q.beta[p, i] += q.lag[p, i, 2] * (clip(q.command[p, i, 2], -1.0, 1.0) - q.beta[p, i])
-
-
-@inner
-def _prepare_lags(w, p, h):
-    """Share of the way to the reference that each lag covers in h seconds."""
-    q = w.plants
+    if q.lag_step[p] == h:
+        return
     q.lag_step[p] = h
     for i in range(q.thrusters[p]):
         q.lag[p, i, 0] = _share(q.n_lag[p, i], h, q.euler_actuators[p])
@@ -59,24 +41,64 @@ def _share(lag, h, euler):
 
 
 @inner
-def thrust(w, p):
-    """Force and moment (X [N], Y [N], N [N m]) {b} of all thrusters of plant p.
+def actuate(g):
+    """Advance shaft speeds, nozzles and buckets towards ``command`` ([A, 3] in [-1, 1]): x <- x + share (x_ref - x).
+
+    Demands beyond [-1, 1] saturate; NaN is for the caller to refuse.
+    """
+    # by constants, so that LLVM sees which rows are meant, and that they are others than those written
+    if g.thrusters > 0:
+        _actuate(g, 0)
+    if g.thrusters > 1:
+        _actuate(g, 1)
+    if g.thrusters > 2:
+        _actuate(g, 2)
+    if g.thrusters > 3:
+        _actuate(g, 3)
+
+
+@scalar
+def _actuate(g, i):
+    for l in range(LANES):
+        demand = clip(g.command[i, 0, l], -1.0, 1.0)
+        idle = g.n_idle[i, l]
+        ahead, astern = g.n_max[i, l] - idle, idle - g.n_min[i, l]
+        g.n[i, l] += g.lag[i, 0, l] * (idle + demand * (ahead if demand >= 0.0 else astern) - g.n[i, l])
+        # a nozzle that points to port pushes the stern to port and the bow to starboard
+        alpha = -g.nozzle_max[i, l] * clip(g.command[i, 1, l], -1.0, 1.0)
+        g.alpha[i, l] += g.lag[i, 1, l] * (alpha - g.alpha[i, l])
+        g.beta[i, l] += g.lag[i, 2, l] * (clip(g.command[i, 2, l], -1.0, 1.0) - g.beta[i, l])
+
+
+@inner
+def thrust(g):
+    """Write force and moment (X [N], Y [N], N [N m]) {b} of all thrusters into ``tau``.
 
     Each gives F = gain n|n| beta along direction + alpha at (x, y), hence N = x Y - y X.  With ``bucket_in_yaw`` 0 the
     moment leaves beta out, as the original did.
     """
-    q = w.plants
-    surge = 0.0
-    sway = 0.0
-    yaw = 0.0
-    for i in range(q.thrusters[p]):
-        n = q.n[p, i]
-        if n == 0.0:
-            continue
-        force = (q.gain_ahead[p, i] if n > 0.0 else q.gain_astern[p, i]) * n * abs(n) * q.thrust_left[p, i]
-        sine, cosine = sincos(q.direction[p, i] + q.alpha[p, i])
-        beta = q.beta[p, i] if q.bucket[p, i] != 0 else 1.0
-        surge += force * beta * cosine
-        sway += force * beta * sine
-        yaw += force * (beta if q.bucket_in_yaw[p] != 0 else 1.0) * (q.x[p, i] * sine - q.y[p, i] * cosine)
-    return surge, sway, yaw
+    for l in range(LANES):
+        g.tau[0, l] = 0.0
+        g.tau[1, l] = 0.0
+        g.tau[2, l] = 0.0
+    if g.thrusters > 0:
+        _thrust(g, 0)
+    if g.thrusters > 1:
+        _thrust(g, 1)
+    if g.thrusters > 2:
+        _thrust(g, 2)
+    if g.thrusters > 3:
+        _thrust(g, 3)
+
+
+@scalar
+def _thrust(g, i):
+    for l in range(LANES):
+        n = g.n[i, l]
+        ahead, astern, beta = g.gain_ahead[i, l], g.gain_astern[i, l], g.beta[i, l]
+        force = (ahead if n > 0.0 else astern) * n * abs(n) * g.thrust_left[i, l]
+        sine, cosine = sincos_random(g.direction[i, l] + g.alpha[i, l])
+        g.tau[0, l] += force * beta * cosine
+        g.tau[1, l] += force * beta * sine
+        lever = beta if g.bucket_in_yaw[l] != 0.0 else 1.0
+        g.tau[2, l] += force * lever * (g.x[i, l] * sine - g.y[i, l] * cosine)

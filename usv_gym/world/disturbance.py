@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from .. import rng
-from ..jit import inner
-from ..trig import atan2, clip, exp, sincos
+from ..jit import inner, scalar
+from ..trig import atan2, clip, exp, sincos_random
 from ..units import DEG
+from .lanes import LANES
 
 GRAVITY = 9.81  #: [m/s2]
 AIR_DENSITY = 1.204  #: [kg/m3]
@@ -33,7 +34,16 @@ def weather_reset(w):
     _ou_start(weather.wind_turn, w, rng.WIND, 2)
     _ou_start(weather.current_slow, w, rng.CURRENT, 0)
     _ou_start(weather.current_turn, w, rng.CURRENT, 1)
-    _realise(weather)
+    x = weather.wind_slow.x, weather.wind_gust.x, weather.wind_turn.x
+    limit = weather.wind_slow.limit, weather.wind_gust.limit, weather.wind_turn.limit
+    weather.wind_direction, weather.wind_u10 = _wind(
+        weather.wind_speed, weather.wind_to, weather.original,
+        clip(x[0], -limit[0], limit[0]), clip(x[1], -limit[1], limit[1]), clip(x[2], -limit[2], limit[2]),
+    )  # fmt: skip
+    slow, turn = weather.current_slow, weather.current_turn
+    weather.current[0], weather.current[1] = _current(
+        weather.current_speed, weather.current_to, clip(slow.x, -slow.limit, slow.limit), clip(turn.x, -turn.limit, turn.limit)
+    )
     q = w.plants
     for p in range(q.thrusters.shape[0]):
         for i in range(3):
@@ -57,135 +67,159 @@ def _ou_start(process, w, stream, slot):
 
 
 @inner
-def weather_step(w, tick):
-    """Advance wind and current by one tick and write ``wind_u10``, ``wind_direction`` and ``current``."""
-    weather = w.weather
-    if weather.on == 0:
+def weather_step(g):
+    """Advance the clock of all lanes by a tick; where there is weather, wind and current as well.
+
+    Writes ``wind_u10``, ``wind_direction`` and ``current``.
+    """
+    for l in range(LANES):
+        g.tick[l] += 1
+    if g.any_weather == 0:
         return
-    if weather.wind_speed > 0.0:
-        a, b = rng.normal2(w.seed, rng.WIND, 0, tick)
-        c, _ = rng.normal2(w.seed, rng.WIND, 1, tick)
-        _ou_step(weather.wind_slow, a, weather.original)
-        _ou_step(weather.wind_gust, b, weather.original)
-        _ou_step(weather.wind_turn, c, weather.original)
-    if weather.current_speed > 0.0:
-        a, b = rng.normal2(w.seed, rng.CURRENT, 0, tick)
-        _ou_step(weather.current_slow, a, weather.original)
-        _ou_step(weather.current_turn, b, weather.original)
-    _realise(weather)
+    for l in range(LANES):
+        on = g.on[l] != 0.0
+        a, b = rng.normal2(g.seed[l], rng.WIND, 0, g.tick[l])
+        c, _ = rng.normal2(g.seed[l], rng.WIND, 1, g.tick[l])
+        blows = on & (g.wind_speed[l] > 0.0)
+        slow, gust, turn = _ou_step(g.wind_slow, g, l, a), _ou_step(g.wind_gust, g, l, b), _ou_step(g.wind_turn, g, l, c)
+        g.wind_slow.x[l] = slow if blows else g.wind_slow.x[l]
+        g.wind_gust.x[l] = gust if blows else g.wind_gust.x[l]
+        g.wind_turn.x[l] = turn if blows else g.wind_turn.x[l]
+    for l in range(LANES):
+        on = g.on[l] != 0.0
+        a, b = rng.normal2(g.seed[l], rng.CURRENT, 0, g.tick[l])
+        flows = on & (g.current_speed[l] > 0.0)
+        slow, turn = _ou_step(g.current_slow, g, l, a), _ou_step(g.current_turn, g, l, b)
+        g.current_slow.x[l] = slow if flows else g.current_slow.x[l]
+        g.current_turn.x[l] = turn if flows else g.current_turn.x[l]
+    for l in range(LANES):
+        on = g.on[l] != 0.0
+        direction, u10 = _wind(g.wind_speed[l], g.wind_to[l], g.original[l], _limited(g.wind_slow, l), _limited(g.wind_gust, l),
+                               _limited(g.wind_turn, l))  # fmt: skip
+        north, east = _current(g.current_speed[l], g.current_to[l], _limited(g.current_slow, l), _limited(g.current_turn, l))
+        g.wind_direction[l] = direction if on else g.wind_direction[l]
+        g.wind_u10[l] = u10 if on else g.wind_u10[l]
+        g.current[0, l] = north if on else g.current[0, l]
+        g.current[1, l] = east if on else g.current[1, l]
+
+
+@scalar
+def _ou_step(process, g, l, noise):
+    """x of lane l a tick on."""
+    x = process.decay[l] * process.x[l] + process.kick[l] * noise
+    return clip(x, -process.limit[l], process.limit[l]) if g.original[l] != 0.0 else x
+
+
+@scalar
+def _limited(process, l):
+    return clip(process.x[l], -process.limit[l], process.limit[l])
+
+
+@scalar
+def _wind(mean, to, original, slow, gust, turn):
+    """Direction [rad] and speed at 10 m [m/s] of the wind; a mean of 0 stays exactly 0."""
+    speed = mean + slow + gust
+    speed = speed if original != 0.0 else max(speed, 0.0)
+    return (to + turn if mean > 0.0 else to), (speed if mean > 0.0 else 0.0)
+
+
+@scalar
+def _current(mean, to, slow, turn):
+    """Velocity [N, E] of the water [m/s]; a mean of 0 stays exactly 0."""
+    sine, cosine = sincos_random(to + turn)
+    speed = mean + slow if mean > 0.0 else 0.0
+    return speed * cosine, speed * sine
 
 
 @inner
-def _ou_step(process, noise, original):
-    process.x = process.decay * process.x + process.kick * noise
-    if original != 0:
-        process.x = _limited(process)
-
-
-@inner
-def _limited(process):
-    return clip(process.x, -process.limit, process.limit)
-
-
-@inner
-def _realise(weather):
-    """Write the realised wind and current; a mean of 0 stays exactly 0."""
-    weather.wind_direction = weather.wind_to
-    weather.wind_u10 = 0.0
-    if weather.wind_speed > 0.0:
-        weather.wind_direction += _limited(weather.wind_turn)
-        speed = weather.wind_speed + _limited(weather.wind_slow) + _limited(weather.wind_gust)
-        weather.wind_u10 = speed if weather.original != 0 else max(speed, 0.0)
-    weather.current[0] = 0.0
-    weather.current[1] = 0.0
-    if weather.current_speed > 0.0:
-        sine, cosine = sincos(weather.current_to + _limited(weather.current_turn))
-        speed = weather.current_speed + _limited(weather.current_slow)
-        weather.current[0] = speed * cosine
-        weather.current[1] = speed * sine
-
-
-@inner
-def wind_load(w, j, p, sine, cosine):
-    """Wind force on vessel slot j with plant p at heading (sine, cosine): writes ``tau_wind``.
+def wind_load(g):
+    """Wind force on all vessels: writes ``tau_wind``.
 
     Coefficients after Blendermann (1994), in the form of Fossen (2021), section 10.1; see ``docs/vessels.md``.
     """
-    weather = w.weather
-    q = w.plants
-    wind_n = 0.0
-    wind_e = 0.0
-    if weather.wind_u10 != 0.0:
-        east, north = sincos(weather.wind_direction)
-        wind_n = weather.wind_height_factor * weather.wind_u10 * north
-        wind_e = weather.wind_height_factor * weather.wind_u10 * east
-    # velocity of the vessel through the air: along its bow and to starboard
-    u = w.vessels.nu[j, 0] - (cosine * wind_n + sine * wind_e)
-    v = w.vessels.nu[j, 1] - (cosine * wind_e - sine * wind_n)
-    speed2 = u * u + v * v
-    if q.area_side[p] <= 0.0 or speed2 == 0.0:
-        q.tau_wind[p, 0] = q.tau_wind[p, 1] = q.tau_wind[p, 2] = 0.0
-        return
-    per_speed = 1.0 / math.sqrt(speed2)
-    along = u * per_speed
-    across = v * per_speed
-    cd_l = (q.cd_l_bow[p] if u >= 0.0 else q.cd_l_stern[p]) * q.wind_surge_factor[p]
-    # delta / 2 sin^2(2 angle) = 2 delta (along across)^2
-    squeeze = 1.0 - 2.0 * q.wind_delta[p] * (1.0 - cd_l / q.cd_t[p]) * (along * across) ** 2
-    load = 0.5 * AIR_DENSITY * speed2 * q.area_side[p] / squeeze
-    side = -load * q.cd_t[p] * across
-    q.tau_wind[p, 0] = -load * cd_l * along
-    q.tau_wind[p, 1] = side
-    q.tau_wind[p, 2] = side * (q.wind_arm[p] - 0.18 * (atan2(abs(v), u) - 0.5 * math.pi) * q.length_pp[p])
+    for l in range(LANES):
+        sine, cosine, wind = g.sine[l], g.cosine[l], g.wind_height_factor[l] * g.wind_u10[l]
+        east, north = sincos_random(g.wind_direction[l])
+        wind_n, wind_e = wind * north, wind * east
+        # velocity of the vessel through the air: along its bow and to starboard
+        u = g.nu[0, l] - (cosine * wind_n + sine * wind_e)
+        v = g.nu[1, l] - (cosine * wind_e - sine * wind_n)
+        speed2 = u * u + v * v
+        felt = (g.area_side[l] > 0.0) & (speed2 > 0.0)
+        per_speed = 1.0 / math.sqrt(speed2 if felt else 1.0)
+        along = u * per_speed
+        across = v * per_speed
+        bow, stern = g.cd_l_bow[l], g.cd_l_stern[l]
+        cd_l = (bow if u >= 0.0 else stern) * g.wind_surge_factor[l]
+        # delta / 2 sin^2(2 angle) = 2 delta (along across)^2
+        squeeze = 1.0 - 2.0 * g.wind_delta[l] * (1.0 - cd_l / (g.cd_t[l] if felt else 1.0)) * (along * across) ** 2
+        load = 0.5 * AIR_DENSITY * speed2 * g.area_side[l] / squeeze
+        side = -load * g.cd_t[l] * across
+        turn = side * (g.wind_arm[l] - 0.18 * (atan2(abs(v), u) - 0.5 * math.pi) * g.length_pp[l])
+        g.tau_wind[0, l] = -load * cd_l * along if felt else 0.0
+        g.tau_wind[1, l] = side if felt else 0.0
+        g.tau_wind[2, l] = turn if felt else 0.0
 
 
 @inner
-def wave_step(w, p, j, tick):
-    """Advance the wave-force states of plant p, vessel slot j, by one tick and write ``tau_wave[p]`` (X, Y, N).
+def wave_step(g):
+    """Advance the wave-force states of all plants by one tick and write ``tau_wave`` (X, Y, N).
 
     First-order wave force of degree of freedom i: F_i = sigma_i y2 with y1' = omega y2,
     y2' = -omega y1 - 2 lambda omega y2 + white noise (Fossen 2021, section 10.2), omega the encounter frequency.
     Scaled so that the stationary covariance of y is I, one step is y <- Phi y + chol(I - Phi Phi^T) noise, exactly.
     """
-    weather = w.weather
-    q = w.plants
-    if weather.wave_height <= 0.0:
-        for i in range(3):
-            q.tau_wave[p, i] = 0.0
+    if g.any_waves == 0:
         return
-    h = w.dt
-    damping = weather.wave_damping
-    omega0 = weather.wave_omega0
-    sine, cosine = sincos(weather.wave_to - w.vessels.eta[j, 2])
-    omega = abs(omega0 - omega0 * omega0 / GRAVITY * w.vessels.nu[j, 0] * cosine)
-    if weather.original != 0:  # Euler, one noise for all degrees of freedom
-        noise = rng.normal2(w.seed, rng.WAVE, 3 * j, tick)[0]
-        x1 = q.wave_x[p, 0, 0]
-        x2 = q.wave_x[p, 0, 1]
-        for i in range(3):
-            q.wave_x[p, i, 0] = x1 + h * x2
-            q.wave_x[p, i, 1] = x2 + h * (noise - omega * omega * x1 - 2.0 * damping * omega * x2)
-    else:
+    if g.any_original:
+        _original_waves(g)
+    for l in range(LANES):
+        h, damping, omega0 = g.h[l], g.wave_damping[l], g.wave_omega0[l]
+        sine, cosine = sincos_random(g.wave_to[l] - g.eta[2, l])
+        omega = abs(omega0 - omega0 * omega0 / GRAVITY * g.nu[0, l] * cosine)
         root = math.sqrt(1.0 - damping * damping)
-        s, c = sincos(omega * root * h)
+        s, c = sincos_random(omega * root * h)
         e = exp(-damping * omega * h)
         s *= e / root
         c *= e
         a11 = c + damping * s
         a22 = c - damping * s
         l11 = math.sqrt(max(1.0 - a11 * a11 - s * s, 0.0))
-        l21 = s * (a11 - a22) / l11 if l11 > 0.0 else 0.0
+        l21 = s * (a11 - a22) / (l11 if l11 > 0.0 else 1.0)
+        l21 = l21 if l11 > 0.0 else 0.0
         l22 = math.sqrt(max(1.0 - a22 * a22 - s * s - l21 * l21, 0.0))
+        waves = (g.on[l] != 0.0) & (g.wave_height[l] > 0.0)
+        drawn = waves & (g.original[l] == 0.0)
         for i in range(3):
-            a, b = rng.normal2(w.seed, rng.WAVE, 3 * j + i, tick)
-            y1 = q.wave_x[p, i, 0]
-            y2 = q.wave_x[p, i, 1]
-            q.wave_x[p, i, 0] = a11 * y1 + s * y2 + l11 * a
-            q.wave_x[p, i, 1] = a22 * y2 - s * y1 + l21 * a + l22 * b
-    scale = weather.wave_scale
-    q.tau_wave[p, 0] = -scale * q.wave_gain[p, 0] * abs(cosine) * q.wave_x[p, 0, 1]
-    q.tau_wave[p, 1] = -scale * q.wave_gain[p, 1] * abs(sine) * q.wave_x[p, 1, 1]
-    q.tau_wave[p, 2] = scale * q.wave_gain[p, 2] * q.wave_x[p, 2, 1]
+            a, b = rng.normal2(g.seed[l], rng.WAVE, 3 * g.slot[l] + i, g.tick[l])
+            y1 = g.wave_x[i, 0, l]
+            y2 = g.wave_x[i, 1, l]
+            z1 = a11 * y1 + s * y2 + l11 * a
+            z2 = a22 * y2 - s * y1 + l21 * a + l22 * b
+            g.wave_x[i, 0, l] = z1 if drawn else y1
+            g.wave_x[i, 1, l] = z2 if drawn else y2
+        scale = g.wave_scale[l]
+        g.tau_wave[0, l] = -scale * g.wave_gain[0, l] * abs(cosine) * g.wave_x[0, 1, l] if waves else g.tau_wave[0, l]
+        g.tau_wave[1, l] = -scale * g.wave_gain[1, l] * abs(sine) * g.wave_x[1, 1, l] if waves else g.tau_wave[1, l]
+        g.tau_wave[2, l] = scale * g.wave_gain[2, l] * g.wave_x[2, 1, l] if waves else g.tau_wave[2, l]
+
+
+@inner
+def _original_waves(g):
+    """The states of lanes with the preset `original`: an Euler step, one noise for all degrees of freedom."""
+    for l in range(LANES):
+        h, damping, omega0 = g.h[l], g.wave_damping[l], g.wave_omega0[l]
+        _, cosine = sincos_random(g.wave_to[l] - g.eta[2, l])
+        omega = abs(omega0 - omega0 * omega0 / GRAVITY * g.nu[0, l] * cosine)
+        noise, _ = rng.normal2(g.seed[l], rng.WAVE, 3 * g.slot[l], g.tick[l])
+        drawn = (g.on[l] != 0.0) & (g.wave_height[l] > 0.0) & (g.original[l] != 0.0)
+        x1 = g.wave_x[0, 0, l]
+        x2 = g.wave_x[0, 1, l]
+        z1 = x1 + h * x2
+        z2 = x2 + h * (noise - omega * omega * x1 - 2.0 * damping * omega * x2)
+        for i in range(3):
+            g.wave_x[i, 0, l] = z1 if drawn else g.wave_x[i, 0, l]
+            g.wave_x[i, 1, l] = z2 if drawn else g.wave_x[i, 1, l]
 
 
 #: (std, time constant [s], limit) of x.  Clipping leaves the spreads of the original: gusts 1.8, current 0.114 m/s

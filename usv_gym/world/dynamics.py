@@ -1,4 +1,4 @@
-"""The 3-DOF model of a surface vessel: one tick of (eta, nu) of a vessel slot that has a plant.
+"""The 3-DOF model of a surface vessel: one tick of (eta, nu) of a group of lanes (lanes.py).
 
     M nu_r' + C(nu_r) nu_r + d(nu_r) + mu = tau_thrust + tau_wind + tau_wave,    eta' = R(psi) nu_r + current
 
@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 
 from ..jit import inner, scalar
-from ..trig import log, sincos
+from ..trig import log, sincos_random
 from .actuators import thrust
 from .disturbance import wind_load
+from .lanes import LANES
 
 WATER_DENSITY = 1025.0  #: [kg/m3]
 VISCOSITY = 1.0e-6  #: kinematic, of water [m2/s]
@@ -22,114 +23,98 @@ _PER_DECADE = 1.0 / math.log(10.0)
 
 
 @inner
-def plant_step(w, j, p, h):
-    """Advance vessel slot j with plant p by h seconds, after ``actuate`` and ``wave_step``.
+def sail(g):
+    """Advance all lanes by a tick, after ``actuate`` and ``wave_step``.
 
     Thrust, wind load, wave force and skin friction are evaluated once per tick; (eta, nu) advance by Heun's method.
-    Writes ``eta``, ``nu``, ``velocity`` of the slot and ``tau``, ``tau_wind``, ``memory_x``, ``turned`` of the plant.
+    Writes ``eta``, ``nu``, ``velocity``, ``sine``, ``cosine``, ``tau``, ``tau_wind`` and ``memory_x``.
     """
-    vessels = w.vessels
-    q = w.plants
-    psi = vessels.eta[j, 2]
-    if psi != q.turned[p, 0]:  # somebody has put it there
-        q.turned[p, 0] = psi
-        q.turned[p, 1], q.turned[p, 2] = sincos(psi)
-    sine, cosine = q.turned[p, 1], q.turned[p, 2]
-    current_n = w.weather.current[0]
-    current_e = w.weather.current[1]
-    current_u = cosine * current_n + sine * current_e
-    current_v = cosine * current_e - sine * current_n
-    u = vessels.nu[j, 0] - current_u
-    v = vessels.nu[j, 1] - current_v
-    r = vessels.nu[j, 2]
-
-    surge, sway, yaw = thrust(w, p)
-    q.tau[p, 0] = surge
-    q.tau[p, 1] = sway
-    q.tau[p, 2] = yaw
-    wind_load(w, j, p, sine, cosine)
-    surge += q.tau_wind[p, 0] + q.tau_wave[p, 0]
-    sway += q.tau_wind[p, 1] + q.tau_wave[p, 1]
-    yaw += q.tau_wind[p, 2] + q.tau_wave[p, 2]
-    if q.memory[p] != 0:
-        mu_sway, mu_yaw = _fluid_memory(w, p, v, r, h)
-        sway -= mu_sway
-        yaw -= mu_yaw
-    friction = _surge_friction(w, p, u)
-
-    du, dv, dr = _acceleration(w, p, u, v, r, friction, surge, sway, yaw)
-    u1 = u + h * du
-    v1 = v + h * dv
-    r1 = r + h * dr
-    gain = q.yaw_gain[p]
-    sine1, cosine1 = sincos(psi + h * gain * r)
-    du1, dv1, dr1 = _acceleration(w, p, u1, v1, r1, friction, surge, sway, yaw)
-
-    half = 0.5 * h
-    north = current_n + 0.5 * (cosine * u - sine * v + cosine1 * u1 - sine1 * v1)
-    east = current_e + 0.5 * (sine * u + cosine * v + sine1 * u1 + cosine1 * v1)
-    psi += half * gain * (r + r1)
-    u += half * (du + du1)
-    v += half * (dv + dv1)
-    r += half * (dr + dr1)
-
-    sine, cosine = sincos(psi)
-    q.turned[p, 0] = psi
-    q.turned[p, 1] = sine
-    q.turned[p, 2] = cosine
-    if q.current_turns[p] != 0:
+    thrust(g)
+    wind_load(g)
+    if g.any_memory:
+        _fluid_memory(g)
+    for l in range(LANES):
+        h, psi, sine, cosine = g.h[l], g.eta[2, l], g.sine[l], g.cosine[l]
+        current_n, current_e = g.current[0, l], g.current[1, l]
         current_u = cosine * current_n + sine * current_e
         current_v = cosine * current_e - sine * current_n
-    u += current_u
-    v += current_v
-    vessels.eta[j, 0] += h * north
-    vessels.eta[j, 1] += h * east
-    vessels.eta[j, 2] = psi
-    vessels.nu[j, 0] = u
-    vessels.nu[j, 1] = v
-    vessels.nu[j, 2] = r
-    vessels.velocity[j, 0] = cosine * u - sine * v
-    vessels.velocity[j, 1] = sine * u + cosine * v
+        u = g.nu[0, l] - current_u
+        v = g.nu[1, l] - current_v
+        r = g.nu[2, l]
+        surge = g.tau[0, l] + (g.tau_wind[0, l] + g.tau_wave[0, l])
+        sway = g.tau[1, l] + (g.tau_wind[1, l] + g.tau_wave[1, l])
+        yaw = g.tau[2, l] + (g.tau_wind[2, l] + g.tau_wave[2, l])
+        remembers = g.memory[l] != 0.0
+        sway -= g.memory_force[0, l] if remembers else 0.0
+        yaw -= g.memory_force[1, l] if remembers else 0.0
+        friction = _surge_friction(g, l, u)
+
+        du, dv, dr = _acceleration(g, l, u, v, r, friction, surge, sway, yaw)
+        u1 = u + h * du
+        v1 = v + h * dv
+        r1 = r + h * dr
+        gain = g.yaw_gain[l]
+        sine1, cosine1 = sincos_random(psi + h * gain * r)
+        du1, dv1, dr1 = _acceleration(g, l, u1, v1, r1, friction, surge, sway, yaw)
+
+        half = 0.5 * h
+        north = current_n + 0.5 * (cosine * u - sine * v + cosine1 * u1 - sine1 * v1)
+        east = current_e + 0.5 * (sine * u + cosine * v + sine1 * u1 + cosine1 * v1)
+        psi += half * gain * (r + r1)
+        u += half * (du + du1)
+        v += half * (dv + dv1)
+        r += half * (dr + dr1)
+
+        sine, cosine = sincos_random(psi)
+        turns = g.current_turns[l] != 0.0
+        u += cosine * current_n + sine * current_e if turns else current_u
+        v += cosine * current_e - sine * current_n if turns else current_v
+        g.eta[0, l] += h * north
+        g.eta[1, l] += h * east
+        g.eta[2, l] = psi
+        g.nu[0, l] = u
+        g.nu[1, l] = v
+        g.nu[2, l] = r
+        g.velocity[0, l] = cosine * u - sine * v
+        g.velocity[1, l] = sine * u + cosine * v
+        g.sine[l] = sine
+        g.cosine[l] = cosine
 
 
 @scalar
-def _surge_friction(w, p, u):
+def _surge_friction(g, l, u):
     """Coefficient of |u| u: Xuu and, scaled, the ITTC-1957 line 0.075 / (log10 Re - 2)^2 plus a residual of 0.014."""
-    q = w.plants
-    if q.Xuu_ittc[p] == 0.0:
-        return q.Xuu[p]
-    reynolds = max(u, 0.2) * q.length_pp[p] / VISCOSITY
+    reynolds = max(u, 0.2) * g.length_pp[l] / VISCOSITY
     decades = log(reynolds) * _PER_DECADE - 2.0
-    return q.Xuu[p] + q.Xuu_ittc[p] * (0.075 / (decades * decades) + 0.014)
+    scaled = g.Xuu_ittc[l]
+    return g.Xuu[l] + (scaled * (0.075 / (decades * decades) + 0.014) if scaled != 0.0 else 0.0)
 
 
 @scalar
-def _acceleration(w, p, u, v, r, friction, surge, sway, yaw):
+def _acceleration(g, l, u, v, r, friction, surge, sway, yaw):
     """(u', v', r') from velocities through the water and the external force: M^-1 (tau - C nu - d(nu))."""
-    q = w.plants
     av = abs(v)
     ar = abs(r)
-    surge += (q.Xu[p] + friction * abs(u) + q.Xuuu[p] * u * u) * u
+    surge += (g.Xu[l] + friction * abs(u) + g.Xuuu[l] * u * u) * u
     sway += (
-        (q.Yv[p] + q.Yvv[p] * av + q.Yvvv[p] * v * v + q.Yrv[p] * ar) * v
-        + (q.Yr[p] + q.Yvr[p] * av + q.Yrr[p] * ar) * r
+        (g.Yv[l] + g.Yvv[l] * av + g.Yvvv[l] * v * v + g.Yrv[l] * ar) * v
+        + (g.Yr[l] + g.Yvr[l] * av + g.Yrr[l] * ar) * r
     )  # fmt: skip
     yaw += (
-        (q.Nv[p] + q.Nvv[p] * av + q.Nrv[p] * ar) * v
-        + (q.Nr[p] + q.Nvr[p] * av + q.Nrr[p] * ar + q.Nrrr[p] * r * r) * r
+        (g.Nv[l] + g.Nvv[l] * av + g.Nrv[l] * ar) * v
+        + (g.Nr[l] + g.Nvr[l] * av + g.Nrr[l] * ar + g.Nrrr[l] * r * r) * r
     )  # fmt: skip
-    c11 = q.coriolis[p, 0]
+    c11 = g.coriolis[0, l]
     sway -= c11 * u * r
-    if q.coriolis_linearised[p] == 0:  # does no work
-        momentum = q.coriolis[p, 1] * v + q.coriolis[p, 2] * r
-        surge += momentum * r
-        yaw -= momentum * u - c11 * u * v
-    if av >= q.crossflow_dead_zone[p]:
-        drag = 0.5 * WATER_DENSITY * q.draught[p] * q.cd2d[p]
-        force, moment = crossflow(v, r, q.strip_x0[p], q.strip_x1[p])
-        sway -= q.crossflow_sway[p] * drag * force
-        yaw -= q.crossflow_yaw[p] * drag * moment
-    return q.i11[p] * surge, q.i22[p] * sway + q.i23[p] * yaw, q.i32[p] * sway + q.i33[p] * yaw
+    full = 1.0 - g.coriolis_linearised[l]  # what does no work
+    momentum = full * (g.coriolis[1, l] * v + g.coriolis[2, l] * r)
+    surge += momentum * r
+    yaw -= momentum * u - full * c11 * u * v
+    drag = 0.5 * WATER_DENSITY * g.draught[l] * g.cd2d[l] if av >= g.crossflow_dead_zone[l] else 0.0
+    force, moment = crossflow(v, r, g.strip_x0[l], g.strip_x1[l])
+    sway -= g.crossflow_sway[l] * drag * force
+    yaw -= g.crossflow_yaw[l] * drag * moment
+    return g.i11[l] * surge, g.i22[l] * sway + g.i23[l] * yaw, g.i32[l] * sway + g.i33[l] * yaw
 
 
 @scalar
@@ -142,54 +127,58 @@ def crossflow(v, r, x0, x1):
     """
     y0 = v + x0 * r
     y1 = v + x1 * r
-    if y0 * y1 >= 0.0:
-        m0 = x1 - x0
-        m1 = 0.5 * (x1 * x1 - x0 * x0)
-        m2 = (x1 * x1 * x1 - x0 * x0 * x0) * _THIRD
-        m3 = m1 * 0.5 * (x1 * x1 + x0 * x0)
-        sign = 1.0 if y0 + y1 >= 0.0 else -1.0
-        return sign * (v * v * m0 + r * (2.0 * v * m1 + r * m2)), sign * (v * v * m1 + r * (2.0 * v * m2 + r * m3))
+    m0 = x1 - x0
+    m1 = 0.5 * (x1 * x1 - x0 * x0)
+    m2 = (x1 * x1 * x1 - x0 * x0 * x0) * _THIRD
+    m3 = m1 * 0.5 * (x1 * x1 + x0 * x0)
+    sign = 1.0 if y0 + y1 >= 0.0 else -1.0
+    force, moment = sign * (v * v * m0 + r * (2.0 * v * m1 + r * m2)), sign * (v * v * m1 + r * (2.0 * v * m2 + r * m3))
     c0 = abs(y0 * y0 * y0)
     c1 = abs(y1 * y1 * y1)
     third = (c1 - c0) * _THIRD
-    g = 1.0 / r
-    return third * g, (0.25 * (y1 * c1 - y0 * c0) - v * third) * g * g
+    one_sign = y0 * y1 >= 0.0
+    g = 1.0 / (1.0 if one_sign else r)
+    crossing = (0.25 * (y1 * c1 - y0 * c0) - v * third) * g * g
+    return force if one_sign else third * g, moment if one_sign else crossing
 
 
 @inner
-def _fluid_memory(w, p, v, r, h):
-    """Radiation force of the waves that the hull itself has made: (sway [N], yaw [N m]), and one step of its states.
+def _fluid_memory(g):
+    """Radiation force of the waves that the hull itself has made into ``memory_force``, and one step of its states.
 
     Three transfer functions in controllable companion form, with a zero at 0 (no effect on steady motion): sway to
     sway, yaw to yaw, and one of order 2 for both couplings (Kristiansen, Hjulstad and Egeland 2005).
     """
-    q = w.plants
-    sway = _transfer(q.memory_x[p, 0], q.memory_den[p, 0], q.memory_num[p, 0], v, h)
-    yaw = _transfer(q.memory_x[p, 1], q.memory_den[p, 1], q.memory_num[p, 1], r, h)
-    sway += _transfer(q.memory_x[p, 2], q.memory_den[p, 2], q.memory_num[p, 2], r, h)
-    yaw += _transfer(q.memory_x[p, 3], q.memory_den[p, 2], q.memory_num[p, 2], v, h)
-    return q.memory_scale[p, 0] * sway, q.memory_scale[p, 1] * yaw
+    for l in range(LANES):
+        h, sine, cosine = g.h[l], g.sine[l], g.cosine[l]
+        v = g.nu[1, l] - (cosine * g.current[1, l] - sine * g.current[0, l])
+        r = g.nu[2, l]
+        sway = _transfer(g, l, 0, 0, v, h) + _transfer(g, l, 2, 2, r, h)
+        yaw = _transfer(g, l, 1, 1, r, h) + _transfer(g, l, 3, 2, v, h)
+        g.memory_force[0, l] = g.memory_scale[0, l] * sway
+        g.memory_force[1, l] = g.memory_scale[1, l] * yaw
 
 
-@inner
-def _transfer(x, den, num, drive, h):
+@scalar
+def _transfer(g, l, s, k, drive, h):
     """Output of x1' = drive - den x, x_i' = x_{i-1} half a step on, and the states a step on (implicit midpoint rule).
 
-    Midpoints are m_i = x_i + h/2 m_{i-1}; all follow from m_1, for which one linear equation is solved.  The rule is
-    stable at any step, which explicit Euler is not.
+    x: row s of ``memory_x``; den, num: row k.  Midpoints are m_i = x_i + h/2 m_{i-1}; all follow from m_1, for which one linear
+    equation is solved.  The rule is stable at any step, which explicit Euler is not.
     """
-    g = 0.5 * h
-    k2 = x[1]
-    k3 = x[2] + g * k2
-    k4 = x[3] + g * k3
-    m1 = (x[0] + g * (drive - den[1] * k2 - den[2] * k3 - den[3] * k4)) / (
-        1.0 + g * (den[0] + g * (den[1] + g * (den[2] + g * den[3])))
+    x, den, num = g.memory_x, g.memory_den, g.memory_num
+    half = 0.5 * h
+    k2 = x[s, 1, l]
+    k3 = x[s, 2, l] + half * k2
+    k4 = x[s, 3, l] + half * k3
+    m1 = (x[s, 0, l] + half * (drive - den[k, 1, l] * k2 - den[k, 2, l] * k3 - den[k, 3, l] * k4)) / (
+        1.0 + half * (den[k, 0, l] + half * (den[k, 1, l] + half * (den[k, 2, l] + half * den[k, 3, l])))
     )
-    m2 = x[1] + g * m1
-    m3 = x[2] + g * m2
-    m4 = x[3] + g * m3
-    x[0] = 2.0 * m1 - x[0]
-    x[1] = 2.0 * m2 - x[1]
-    x[2] = 2.0 * m3 - x[2]
-    x[3] = 2.0 * m4 - x[3]
-    return num[0] * m1 + num[1] * m2 + num[2] * m3 + num[3] * m4
+    m2 = x[s, 1, l] + half * m1
+    m3 = x[s, 2, l] + half * m2
+    m4 = x[s, 3, l] + half * m3
+    x[s, 0, l] = 2.0 * m1 - x[s, 0, l]
+    x[s, 1, l] = 2.0 * m2 - x[s, 1, l]
+    x[s, 2, l] = 2.0 * m3 - x[s, 2, l]
+    x[s, 3, l] = 2.0 * m4 - x[s, 3, l]
+    return num[k, 0, l] * m1 + num[k, 1, l] * m2 + num[k, 2, l] * m3 + num[k, 3, l] * m4
