@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from numba import njit
@@ -17,7 +19,7 @@ Q, BIAS, T, NOISE = 0.004, 1.6, 10.0, 3.2
 @njit(error_model="numpy")
 def _run(x, P, fixes, velocities, h, f):
     for k in range(fixes.shape[0]):
-        light.predict(x, P, h, Q, BIAS, T)
+        light.predict(x, P, h, math.exp(-h / T), Q, BIAS)
         light.update_position(x, P, fixes[k, 0], fixes[k, 1], f, f * f * NOISE * NOISE)
         if k % 3 == 0:
             light.update_velocity(x, P, velocities[k, 0], velocities[k, 1], 0.7)

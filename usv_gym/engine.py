@@ -13,7 +13,7 @@ import math
 from .events import run_events
 from .jit import inner, lean_kernel, spliced
 from .sensors.nav import navigate
-from .sensors.schedule import first_events, sense
+from .sensors.schedule import first_events, moves_observers, sense
 from .traffic.replay import begin_replay, replay
 from .traffic.ships import follow_route, move_traffic, steer
 from .world.actuators import actuate, prepare_lags
@@ -40,6 +40,12 @@ def _due(w):
     return min(w.frame_tick + w.frame_ticks, w.next_nav, w.next_sense)
 
 
+@inner
+def sails(lanes, p):
+    """True if any world of the group has plant p; the first record also carries the weather of worlds without a plant."""
+    return p == 0 or lanes[p].any_plant != 0
+
+
 @spliced
 def tick_lanes(lanes, rows, row):
     """Advance weather and plants of a group by one tick.
@@ -49,7 +55,7 @@ def tick_lanes(lanes, rows, row):
     """
     for p in range(lanes.shape[0]):
         g = lanes[p]
-        if p > 0 and g.any_plant == 0:
+        if not sails(lanes, p):
             continue
         weather_step(g)
         if g.any_plant == 0:
@@ -75,17 +81,16 @@ def attend(lanes, l, w, land, tracks):
         disembark(lanes, l, w)
     else:
         for p in range(lanes.shape[0]):
-            scatter_motion(lanes[p], l, w)
+            if sails(lanes, p):
+                scatter_motion(lanes[p], l, w)
     tick = w.tick
     if tick - w.frame_tick >= w.frame_ticks:
         end_frame(w, land, tracks)
     if tick >= w.next_nav:
-        for o in range(w.observer.shape[0]):
-            if w.vessels.model[w.observer[o]] != MODEL_3DOF:
-                move_traffic(w, tick)  # a kinematic observer is where the traffic is
+        if moves_observers(w):
+            move_traffic(w, tick)
         navigate(w, tick)
     if tick >= w.next_sense:
-        move_traffic(w, tick)
         sense(w, land, tick)
     if eventful:
         for p in range(lanes.shape[0]):
@@ -97,7 +102,8 @@ def attend(lanes, l, w, land, tracks):
 def disembark(lanes, l, w):
     """Write what has become of lane l into its world."""
     for p in range(lanes.shape[0]):
-        scatter(lanes[p], l, w, p)
+        if sails(lanes, p):
+            scatter(lanes[p], l, w, p)
 
 
 @spliced

@@ -38,15 +38,30 @@ VARIANCE_MIN = 1e-8
 _N, _E, _BN_N, _BN, _BE_E, _BE = 0, 2, 28, 35, 37, 44  # packed entries that the static filter uses
 
 
+#: Time constant of forgetting in the line fit of ``tracker`` [s]
+MEMORY = 60.0
+
+
+@inner
+def decays(scan, h):
+    """Work out what ``scan`` keeps of a time of h [s] between two fixes: nearly all targets of a scan ask for the same one."""
+    if scan.elapsed != h:
+        scan.elapsed = h
+        for i in range(2):
+            scan.decay[i] = exp(-h / scan.bias_time[i]) if h > 0.0 else 1.0
+        scan.fade = exp(-h / MEMORY) if h > 0.0 else 1.0
+        scan.slowness = (1.0 + scan.decay[0]) / (1.0 - scan.decay[0])
+
+
 # --- prediction ------------------------------------------------------------------------------------------------------
 @inner
 def predict_scan(x, P, h, sensors, scan):
     """Move a radar or LiDAR filter by h [s]."""
     if h > 0.0:
         predict_motion(x, P, 9, h, sensors)
-        a = exp(-h / scan.bias_time[0])
+        decays(scan, h)
         for i in range(7, 9):
-            _predict_bias(x, P, 9, i, a, scan.bias[0])
+            _predict_bias(x, P, 9, i, scan.decay[0], scan.bias[0])
 
 
 @inner
@@ -76,24 +91,22 @@ def _predict_bias(x, P, n, i, a, bias):
 
 
 @inner
-def predict_position(x, P, h, bias, bias_time):
-    """Move a static filter by h [s]: only its sensor biases (standard deviation [m], time constant [s]) change."""
-    if h > 0.0:
-        a = exp(-h / bias_time)
-        x[7] *= a
-        x[8] *= a
-        P[_BN_N] = P[_BE_E] = a * P[_BN_N]
-        P[_BN] = P[_BE] = a * a * P[_BN] + bias * bias * (1.0 - a * a)
+def predict_position(x, P, a, bias):
+    """Move a static filter: only its sensor biases (standard deviation [m]) change, of which the share a is left."""
+    x[7] *= a
+    x[8] *= a
+    P[_BN_N] = P[_BE_E] = a * P[_BN_N]
+    P[_BN] = P[_BE] = a * a * P[_BN] + bias * bias * (1.0 - a * a)
 
 
 @inner
 def predict_size(x, P, h, scan):
     """Move a size filter by h [s]: the radius is constant, its bias is not."""
-    if h > 0.0:
-        a = exp(-h / scan.bias_time[1])
-        x[1] *= a
-        P[1] *= a
-        P[2] = a * a * P[2] + scan.bias[1] * scan.bias[1] * (1.0 - a * a)
+    decays(scan, h)
+    a = scan.decay[1]
+    x[1] *= a
+    P[1] *= a
+    P[2] = a * a * P[2] + scan.bias[1] * scan.bias[1] * (1.0 - a * a)
 
 
 @inner

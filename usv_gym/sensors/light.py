@@ -23,11 +23,13 @@ from . import ekf
 
 
 @inner
-def predict(x, P, h, q, bias, bias_time):
-    """Move a filter by h [s]; q is the density of the acceleration, ``bias`` the stationary deviation of the bias."""
+def predict(x, P, h, a, q, bias):
+    """Move a filter by h [s], after which the share a of the bias is left.
+
+    q is the density of the acceleration, ``bias`` the stationary deviation of the bias.
+    """
     if h <= 0.0:
         return
-    a = exp(-h / bias_time)
     x[0] += h * x[2]
     x[1] += h * x[3]
     x[4] *= a
@@ -114,7 +116,7 @@ def _variance(noise, bias, bias_time, h):
 @inner
 def track_ais(x, P, h, n, e, psi, u, sensors):
     """Take an AIS message into a moving filter: position [m], COG [rad] and SOG [m/s], which may be NaN."""
-    predict(x, P, h, sensors.light_q, sensors.ais_bias[0], sensors.ais_bias_time[0])
+    predict(x, P, h, exp(-h / sensors.ais_bias_time[0]), sensors.light_q, sensors.ais_bias[0])
     update_position(x, P, n, e, 1.0, ekf.white(1.0, sensors.ais_noise[0]))
     if not (np.isnan(psi) or np.isnan(u)):
         vn, ve, variance = ais_velocity(psi, u, h, sensors)
@@ -132,7 +134,8 @@ def init_ais(x, P, n, e, psi, u, sensors):
 @inner
 def track_scan(x, P, h, n, e, f, sensors, scan):
     """Take a fix n, e [m] with error factor f of radar or LiDAR into a moving filter."""
-    predict(x, P, h, sensors.light_q, scan.bias[0], scan.bias_time[0])
+    ekf.decays(scan, h)
+    predict(x, P, h, scan.decay[0], sensors.light_q, scan.bias[0])
     update_position(x, P, n, e, f, ekf.white(f, scan.noise[0]))
 
 

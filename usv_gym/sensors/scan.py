@@ -10,15 +10,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .. import rng
 from ..jit import inner, spliced
 from ..trig import exp, hypot
-from ..world.state import LIDAR, RADAR
+from ..world.state import LIDAR, MODEL_3DOF, RADAR
 from .clutter import false_alarms
 from .coastline import deliver_land, echo_land, hide_behind_land
 from .noise import pair_slot
-from .shadow import apparent_half_width, cast_shadows, look_around
+from .shadow import cast_shadows, look_around
 from .tdm import take_scan
+
+_SURE = 0.01  #: [m] more than rounding can make
 
 
 @spliced
@@ -47,6 +51,50 @@ def _decay(bias, bias_time, seconds):
 
 
 @inner
+def _remember(w, o, own, count, tick):
+    """Note after a LiDAR's look around how near the nearest source is that is not in reach, and how fast any may come."""
+    t, v, m = w.tracks, w.vessels, w.obstacles
+    t.clear_distance[o] = 0.0
+    if count > 0:
+        return
+    V = v.active.shape[0]
+    # numbers that are not negative have the order of their bits: whole numbers are compared in parallel
+    nearest = np.float64(math.inf).view(np.int64)
+    fastest = np.int64(0)
+    for s in range(w.ranges.shape[0]):
+        nearest = min(nearest, np.float64(w.ranges[s]).view(np.int64))
+    for s in range(V):
+        free = (v.active[s] != 0) & (v.model[s] == MODEL_3DOF) & (s != own)  # bound to nothing within a frame
+        speed2 = math.inf if free else v.velocity[s, 0] * v.velocity[s, 0] + v.velocity[s, 1] * v.velocity[s, 1]
+        fastest = max(fastest, np.float64(speed2 if v.active[s] != 0 else 0.0).view(np.int64))
+    for i in range(m.active.shape[0]):
+        speed2 = m.velocity[i, 0] * m.velocity[i, 0] + m.velocity[i, 1] * m.velocity[i, 1]
+        fastest = max(fastest, np.float64(speed2 if m.active[i] != 0 else 0.0).view(np.int64))
+    t.clear_tick[o] = tick
+    t.clear_from[o, 0], t.clear_from[o, 1] = v.eta[own, 0], v.eta[own, 1]
+    t.clear_distance[o] = math.sqrt(np.int64(nearest).view(np.float64))
+    t.clear_speed[o] = math.sqrt(np.int64(fastest).view(np.float64))
+
+
+@inner
+def lidar_sees_nothing(w, tick):
+    """True if no source can have come into reach of any observer's LiDAR since it last looked around within this frame."""
+    t, weather = w.tracks, w.weather
+    reach = w.sensors.lidar.range * weather.lidar_range_factor
+    current = weather.current_speed + weather.current_slow.limit if weather.current_speed > 0.0 else 0.0
+    for o in range(w.observer.shape[0]):
+        own = w.observer[o]
+        if t.clear_tick[o] < w.frame_tick:
+            return False
+        moved = hypot(w.vessels.eta[own, 0] - t.clear_from[o, 0], w.vessels.eta[own, 1] - t.clear_from[o, 1])
+        moved += t.clear_speed[o] * ((tick - t.clear_tick[o]) * w.dt)
+        moved += 2.0 * current * ((tick - w.frame_tick) * w.dt)  # what drifts, from the start of the frame to then and to now
+        if not moved + _SURE < t.clear_distance[o] - reach:
+            return False
+    return True
+
+
+@inner
 def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection,
           stream_land, clutter, stream_clutter):
     t = w.tracks
@@ -57,26 +105,41 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
     if sensor.outage:
         return
     t.scan_found[o, k] = 0
-    count = look_around(w, own, reach)
+    # a LiDAR with the traffic elsewhere is one that sees nothing
+    count = look_around(w, own, reach) if w.traffic_tick == tick else 0
+    if k == LIDAR - 1 and w.traffic_tick == tick:
+        _remember(w, o, own, count, tick)
     cast_shadows(w, count)
     hide_behind_land(w, land, own, count)
     V = w.vessels.active.shape[0]
     now = tick * w.dt_us
     before = now + 1  # when the last source's bias was drawn: nearly all were in the same scan
     a0 = g0 = a1 = g1 = 0.0
+    seen = 0
     for i in range(count):
         s = w.order[i]
         if w.hidden[s]:
             continue
         t.visible[o, k, s] = 1
+        if w.ranges[s] >= sensor.range_min:
+            w.seen[seen] = s
+            w.slots[seen] = pair_slot(w, o, s)
+            seen += 1
+    draw, seed = w.look, w.seed
+    for i in range(seen):  # vector code: what chance has to say of each
+        slot = w.slots[i]
+        draw[0, i] = rng.uniform(seed, stream_detection, slot, tick)
+        draw[1, i], draw[2, i] = rng.normal2(seed, stream_bias, 2 * slot, tick)
+        draw[3, i], draw[4, i] = rng.normal2(seed, stream_bias, 2 * slot + 1, tick)
+        draw[5, i], draw[6, i] = rng.normal2(seed, stream_noise, 2 * slot, tick)
+    for i in range(seen):
+        s = w.seen[i]
         d = w.ranges[s]
-        if d < sensor.range_min:
-            continue
         detection = sensor.detection * w.weather.detection_factor
         if sensor.detection_radius > 0.0:
-            shown = apparent_half_width(w, s)
-            detection *= shown * shown / (shown * shown + sensor.detection_radius * sensor.detection_radius)
-        if detection < 1.0 and rng.uniform(w.seed, stream_detection, pair_slot(w, o, s), tick) >= detection:
+            shown = w.widths[s] * w.widths[s]
+            detection *= shown / (shown + sensor.detection_radius * sensor.detection_radius)
+        if draw[0, i] >= detection:
             continue
         if t.scan_bias_us[o, k, s] != before:
             before = t.scan_bias_us[o, k, s]
@@ -84,15 +147,12 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
             a0, g0 = _decay(sensor.bias[0], sensor.bias_time[0], seconds)
             a1, g1 = _decay(sensor.bias[1], sensor.bias_time[1], seconds)
         t.scan_bias_us[o, k, s] = now
-        slot = 2 * pair_slot(w, o, s)
-        b0, b1 = rng.normal2(w.seed, stream_bias, slot, tick)
-        b2, n2 = rng.normal2(w.seed, stream_bias, slot + 1, tick)
-        n0, n1 = rng.normal2(w.seed, stream_noise, slot, tick)
         b = t.scan_bias[o, k, s]
-        b[0] = a0 * b[0] + g0 * b0
-        b[1] = a0 * b[1] + g0 * b1
-        b[2] = a1 * b[2] + g1 * b2
-        en, ee, er = b[0] + sensor.noise[0] * n0, b[1] + sensor.noise[0] * n1, b[2] + sensor.noise[1] * n2
+        b[0] = a0 * b[0] + g0 * draw[1, i]
+        b[1] = a0 * b[1] + g0 * draw[2, i]
+        b[2] = a1 * b[2] + g1 * draw[3, i]
+        en, ee = b[0] + sensor.noise[0] * draw[5, i], b[1] + sensor.noise[0] * draw[6, i]
+        er = b[2] + sensor.noise[1] * draw[4, i]
         f = sensor.gain * d
         if s < V:
             dn = w.vessels.eta[s, 0] - w.vessels.eta[own, 0]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from ..jit import inner, spliced
+from ..traffic.ships import move_traffic, place
+from ..world.state import MODEL_3DOF
 from .ais import NEVER, next_fire, schedule, transmit, transmits
-from .scan import deliver, scan_lidar, scan_radar
+from .scan import deliver, lidar_sees_nothing, scan_lidar, scan_radar
 from .tdm import publish, take_ais
 
 
@@ -62,11 +64,20 @@ def _due(tick, dt_us, period_us):
     return (tick * dt_us) // period_us > ((tick - 1) * dt_us) // period_us
 
 
+@inner
+def moves_observers(w):
+    """True if an observer's vessel moves with the traffic."""
+    for o in range(w.observer.shape[0]):
+        if w.vessels.model[w.observer[o]] != MODEL_3DOF:
+            return True
+    return False
+
+
 @spliced
 def sense(w, land, tick):
     """Fire everything that is due at ``tick``: transmissions, receptions, scans, then the TDM's report.
 
-    There is room for one message of each source and for one scan under way: what is later than that arrives just before
+    The traffic is carried to this tick if somebody looks at it.  There is room for one message of each source and for one scan under way: what is later than that arrives just before
     the next one is made.
     """
     p = w.sensors
@@ -75,11 +86,15 @@ def sense(w, land, tick):
     lidar = p.lidar.on and _due(tick, w.dt_us, p.lidar.period_us)
     report = _due(tick, w.dt_us, p.tdm_period_us)
     ais = tick >= w.ais_soonest
+    if radar or moves_observers(w) or (lidar and not lidar_sees_nothing(w, tick)):
+        move_traffic(w, tick)
     for make_room in (True, False):
         if ais and not make_room:
             for s in range(S):
                 if tick >= w.ais.next_tick[s]:
                     if transmits(w, s):
+                        if w.traffic_tick != tick:
+                            place(w, s, tick)
                         transmit(w, s, tick)
                     else:  # it has left the sea, or its station is off
                         w.ais.next_tick[s] = NEVER

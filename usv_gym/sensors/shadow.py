@@ -12,16 +12,14 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..jit import inner
-from ..trig import PI, TWO_PI, atan2, sincos, wrap
+from ..trig import PI, TWO_PI, atan2, wrap
 from ..world.geometry import half_width
 
 
 @inner
 def look_around(w, own, reach):
-    """Fill ranges, bearings and half_angles of all sources within ``reach`` metres of vessel ``own``.
+    """Fill ranges, bearings, half_angles and widths (half the width shown) of all sources within ``reach`` metres of vessel ``own``.
 
     Returns how many there are; ``w.order[:count]`` are their indices, nearest first.
     """
@@ -48,20 +46,27 @@ def look_around(w, own, reach):
         if not w.ranges[s] <= reach2:
             continue
         if s < V:
-            dn, de = v.eta[s, 0] - n0, v.eta[s, 1] - e0
+            row = v.eta[s, 0] - n0, v.eta[s, 1] - e0, v.eta[s, 2], v.length[s], v.beam[s], 0.0
         else:
-            dn, de = m.position[s - V, 0] - n0, m.position[s - V, 1] - e0
-        d = math.sqrt(w.ranges[s])
-        bearing = atan2(de, dn)
-        if s < V:
-            width = half_width(v.length[s], v.beam[s], bearing - v.eta[s, 2])
-        else:
-            width = m.radius[s - V]
-        w.ranges[s] = d
-        w.bearings[s] = bearing
-        w.half_angles[s] = atan2(width, d)
+            row = m.position[s - V, 0] - n0, m.position[s - V, 1] - e0, 0.0, 0.0, 0.0, m.radius[s - V]
+        for i in range(6):
+            w.look[i, count] = row[i]
         w.order[count] = s
         count += 1
+    for k in range(count):  # vector code
+        dn, de = w.look[0, k], w.look[1, k]
+        d = math.sqrt(dn * dn + de * de)
+        bearing = atan2(de, dn)
+        width = w.look[5, k] + half_width(w.look[3, k], w.look[4, k], bearing - w.look[2, k])  # a hull's, or a disc's
+        w.look[6, k] = bearing
+        w.look[7, k] = atan2(width, d)
+        w.look[8, k] = width
+    for k in range(count):
+        s = w.order[k]
+        w.ranges[s] = math.sqrt(w.ranges[s])
+        w.bearings[s] = w.look[6, k]
+        w.half_angles[s] = w.look[7, k]
+        w.widths[s] = w.look[8, k]
     _sort_by_range(w, count)
     return count
 
@@ -133,10 +138,3 @@ def cast_shadows(w, count):
         else:
             n, covered = _cover(w, n, low, high)
             w.hidden[s] = covered
-
-
-@inner
-def apparent_half_width(w, s):
-    """Half the width [m] that source s shows, from what look_around() stored."""
-    sine, cosine = sincos(w.half_angles[s])
-    return sine / cosine * w.ranges[s] if w.half_angles[s] < 1.57 else np.inf

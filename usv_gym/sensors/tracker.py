@@ -13,7 +13,7 @@ The line fit of a scan filter is ten numbers, ``start``:
     3-5  sum of weights, mean time [s, of the newest fix, hence negative], sum of squared times about that mean
     6-9  mean N, mean E; sums of time by N and time by E about the means
 
-Each fix weighs 1/variance, and weights fade with MEMORY.  A bias with decay a from fix to fix lets means converge as
+Each fix weighs 1/variance, and weights fade with ``ekf.MEMORY``.  A bias with decay a from fix to fix lets means converge as
 slowly as white noise of the variance sigma_b^2 (1 + a) / (1 - a) would; that variance is used.  The variance of the
 velocity is 1 / start[5] while nothing has faded, and less later, since faded fixes are better than their weight: a
 target that was watched for long and has not moved needs more evidence.
@@ -33,8 +33,6 @@ from ..world.state import PHASE_MOTION, PHASE_POSITION
 from . import ekf, light
 from .motion import predict_motion, start_motion
 
-#: Time constant of forgetting in the line fit [s]
-MEMORY = 60.0
 #: Displacement from the first fix, in standard deviations of two fixes, and speed, in its own, at which motion starts
 DISPLACED, MOVING = 3.0, 3.5
 #: Speed of the fit at which "static" has become doubtful: the position then comes from the line
@@ -64,7 +62,7 @@ def track_ais(x, P, phase, h, n, e, psi, u, r, sensors):
             ekf.init_ais(x, P, n, e, psi, u, r, sensors)
         phase = PHASE_MOTION
     elif phase == PHASE_POSITION:
-        ekf.predict_position(x, P, h, sensors.ais_bias[0], sensors.ais_bias_time[0])
+        ekf.predict_position(x, P, exp(-h / sensors.ais_bias_time[0]) if h > 0.0 else 1.0, sensors.ais_bias[0])
         ekf.update_position(x, P, n, e, 1.0, sensors.ais_noise[0])
     else:
         ekf.init_fix(x, P, n, e, 1.0, sensors.ais_noise[0], sensors.ais_bias[0])
@@ -92,7 +90,8 @@ def track_scan(x, P, start, phase, h, n, e, f, sensors, scan):
             start_line(start, n, e, f, scan)
             phase = PHASE_POSITION
     elif phase == PHASE_POSITION:
-        ekf.predict_position(x, P, h, scan.bias[0], scan.bias_time[0])
+        ekf.decays(scan, h)
+        ekf.predict_position(x, P, scan.decay[0], scan.bias[0])
         ekf.update_position(x, P, n, e, f, scan.noise[0])
         extend_line(start, h, n, e, f, scan)
         speed2 = (start[8] * start[8] + start[9] * start[9]) / start[5]  # in variances of the velocity
@@ -157,10 +156,10 @@ def extend_line(start, h, n, e, f, scan):
     """Add a fix h [s] after the last one (weighted running moments, West 1979, with forgetting)."""
     if h <= 0.0:
         return
-    fade = exp(-h / MEMORY)
-    a = exp(-h / scan.bias_time[0])
+    ekf.decays(scan, h)
+    fade = scan.fade
     bias = f * scan.bias[0]
-    w = 1.0 / (ekf.white(f, scan.noise[0]) + bias * bias * (1.0 + a) / (1.0 - a))
+    w = 1.0 / (ekf.white(f, scan.noise[0]) + bias * bias * scan.slowness)
     old = fade * start[3]
     age = h - start[4]
     share = w / (old + w)

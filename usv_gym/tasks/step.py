@@ -177,6 +177,7 @@ def step_group(worlds, lanes, land, tracks, tasks, episodes, rows):
             if w.sensors.exteroceptive == 0 and not piloted:
                 # nobody reads the own navigation before the step is over, so it is not measured before
                 w.next_nav = max(w.next_nav, w.tick + task.control_ticks)
+            w.look_tick = w.tick if piloted else w.tick + task.control_ticks
             _take_actions(w, tasks, episodes[l])
             board(lanes, l, w, rows.shape[1])
             left += 1

@@ -110,6 +110,23 @@ def steer(w, seconds):
 
 
 @inner
+def place(w, s, tick):
+    """Carry source s alone to ``tick``, as ``move_traffic`` would."""
+    whole = (tick - w.frame_tick) * w.dt
+    v, m, i = w.vessels, w.obstacles, s - w.vessels.active.shape[0]
+    if i < 0:
+        if v.model[s] == MODEL_KINEMATIC:
+            v.eta[s, 0] = v.frame_eta[s, 0] + v.velocity[s, 0] * whole
+            v.eta[s, 1] = v.frame_eta[s, 1] + v.velocity[s, 1] * whole
+            psi = v.frame_eta[s, 2] + v.nu[s, 2] * whole
+            v.eta[s, 2] = wrap(psi) if abs(psi) > MANY_TURNS else psi
+        return
+    current = w.weather.current
+    m.position[i, 0] = m.frame_position[i, 0] + (m.velocity[i, 0] + m.drifts[i] * current[0]) * whole
+    m.position[i, 1] = m.frame_position[i, 1] + (m.velocity[i, 1] + m.drifts[i] * current[1]) * whole
+
+
+@inner
 def move_traffic(w, tick):
     """Carry all traffic to ``tick``: always from where it was as the frame began, so that nobody who looks on the way leaves
     a trace in the last digit."""

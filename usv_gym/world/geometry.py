@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ..jit import inner, scalar
-from ..trig import hypot, sincos
+from ..trig import hypot, sincos, sincos_random
 
 BOW_TAPER = 0.25  #: share of the length over which the bow narrows to a point
 CLOSE = 30.0  #: [m] hulls nearer than this (plus their half lengths) are measured exactly
@@ -104,7 +104,7 @@ def hull_hull(a, b):
 @scalar
 def half_width(length, beam, aspect):
     """Half the width [m] a hull shows to a line of sight at the angle ``aspect`` [rad] from its centre line."""
-    s, c = sincos(aspect)
+    s, c = sincos_random(aspect)
     return 0.5 * (abs(length * s) + abs(beam * c))
 
 

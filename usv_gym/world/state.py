@@ -275,6 +275,9 @@ def _sensors() -> Dtype:
         ("detection", f8), ("detection_radius", f8),  # P_d of a large object; apparent radius [m] at which P_d is halved
         ("timeout_us", i8),
         ("false_alarms", f8),  # mean number per scan
+        # of the time [s] between two fixes last asked for (sensors/ekf.py): decays of both biases, the share of a line's weight
+        # that is left, and by how much the bias slows the convergence of a mean, (1 + a) / (1 - a)
+        ("elapsed", f8), ("decay", f8, (2,)), ("fade", f8), ("slowness", f8),
         ("outage", i1),  # fault: gives nothing
     ], align=True)  # fmt: skip
     return np.dtype([
@@ -358,6 +361,9 @@ def _tracks(O: int, S: int) -> Dtype:
         ("measured_us", i8, (O, 2, S)),
         ("scan_found", i8, (O, 2)),  # how many measurements the last scan has
         ("scan_us", i8, (O, 2)), ("scan_due", i8, (O, 2)),  # stamp of the last scan; tick at which it arrives, -1: did
+        # the LiDAR's last look around, if it saw nothing: tick, from where N, E [m] {n}, distance to the nearest source [m],
+        # largest speed of any source [m/s]; until something may have come within reach, it need not look (sensors/scan.py)
+        ("clear_tick", i8, (O,)), ("clear_from", f8, (O, 2)), ("clear_distance", f8, (O,)), ("clear_speed", f8, (O,)),
         ("visible", i1, (O, 2, S)),  # whether the last scan of that sensor could see the source (truth of the sensor)
         # echoes of land: nearest point N, E [m] {n} in each bearing sector, NaN for none; second axis of 2: the scan under
         # way, the last that arrived
@@ -399,6 +405,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("traffic_tick", i8),  # tick to which positions of traffic refer
         ("ais_soonest", i8),  # first tick at which any AIS message is sent or arrives
         ("next_sense", i8), ("next_nav", i8),  # first tick at which any exteroceptive sensor, any navigation sensor fires
+        ("look_tick", i8),  # before which nobody reads the own navigation, but for the position (sensors/nav.py)
         ("seed", u8),
         ("origin", f8, (2,)), ("metres_per_degree", f8, (2,)),  # latitude, longitude [deg]; [m/deg]
         ("epoch_us", i8),  # UTC of tick 0
@@ -421,7 +428,9 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("steer_how", i1, (V,)), ("steer_north", f8, (V,)), ("steer_east", f8, (V,)), ("steer_heading", f8, (V,)),
         ("steer_speed", f8, (V,)), ("steered_rate", f8, (V,)), ("steered_velocity", f8, (2, V)),
         # work space of the shadow test (sensors/shadow.py)
-        ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("order", i4, (S,)), ("hidden", i1, (S,)),
+        ("slots", i8, (S,)), ("look", f8, (9, S)),  # rows that are vector code's, also of scans and transmissions
+        ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("widths", f8, (S,)),  # [m], [rad], [rad], [m]
+        ("order", i4, (S,)), ("seen", i4, (S,)), ("hidden", i1, (S,)),
         ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)),
         ("estimate_x", f8, (2, 7)), ("estimate_p", f8, (2, 28)),  # of the fusion (sensors/tdm.py)
     ], align=True)  # fmt: skip
