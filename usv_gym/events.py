@@ -137,7 +137,7 @@ def listen(w, s):
     w.ais.next_tick[s] = NEVER
     if w.sensors.exteroceptive and w.sensors.ais_on and transmits(w, s):
         w.ais.next_tick[s] = w.tick + 1
-        w.ais_soonest = min(w.ais_soonest, w.tick + 1)
+        w.ais_send = min(w.ais_send, w.tick + 1)
         w.next_sense = min(w.next_sense, w.tick + 1)
 
 

@@ -261,7 +261,7 @@ def carry_on_from_here(w: Any, source: int) -> None:
     Traffic is carried from where it was as the frame began (traffic/ships.py).
     """
     v, m = w["vessels"], w["obstacles"]
-    w["tracks"]["clear_distance"] = 0.0  # what the LiDAR knows of an empty sea is no longer so
+    w["tracks"]["slack"] = 0.0  # the LiDAR has to look for it
     seconds = float((w["tick"] - w["frame_tick"]) * w["dt"])
     V = len(v["active"])
     if source >= V:

@@ -288,7 +288,7 @@ class Commands:
         w["ais"]["next_tick"][source] = _FAR
         if group["ais_on"][slot] and group["ais_class"][slot] and w["sensors"]["ais_on"] and w["sensors"]["exteroceptive"]:
             w["ais"]["next_tick"][source] = w["tick"] + 1
-            for first in ("ais_soonest", "next_sense"):
+            for first in ("ais_send", "next_sense"):
                 self.worlds[first][self.b] = min(int(w[first]), int(w["tick"]) + 1)
 
     def _forget(self, source: int) -> None:

@@ -109,10 +109,13 @@ def transmit(w, s, tick):
     fresh = a.last_tick[s] < 0
     a.last_tick[s] = tick
     slot = 4 * noise_slot(w, s)
-    draw, seed = w.look, w.seed
-    # vector code, of which two of eight are not used; a bound that is known when it is compiled would be unrolled instead
-    for i in range(8 if p.ais_on else 0):
-        draw[0, i], draw[1, i] = rng.normal2(seed, rng.AIS_BIAS if i < 4 else rng.AIS_NOISE, slot + (i & 3), tick)
+    b0, b1 = rng.normal2(w.seed, rng.AIS_BIAS, slot, tick)
+    b2, b3 = rng.normal2(w.seed, rng.AIS_BIAS, slot + 1, tick)
+    b4, b5 = rng.normal2(w.seed, rng.AIS_BIAS, slot + 2, tick)
+    n0, n1 = rng.normal2(w.seed, rng.AIS_NOISE, slot, tick)
+    n2, n3 = rng.normal2(w.seed, rng.AIS_NOISE, slot + 1, tick)
+    n4, n5 = rng.normal2(w.seed, rng.AIS_NOISE, slot + 2, tick)
+    drive = (b0, b1, b2, b3, b4, b5)
     decay, kick, T = 0.0, 1.0, 0.0
     for k in range(6):
         if fresh or p.ais_bias_time[k] <= 0.0:
@@ -121,8 +124,7 @@ def transmit(w, s, tick):
             T = p.ais_bias_time[k]
             decay = exp(-seconds / T)
             kick = math.sqrt(1.0 - decay * decay)
-        a.bias[s, k] = decay * a.bias[s, k] + p.ais_bias[k] * kick * draw[k & 1, k >> 1]
-    n0, n1, n2, n3, n4, n5 = draw[0, 4], draw[1, 4], draw[0, 5], draw[1, 5], draw[0, 6], draw[1, 6]
+        a.bias[s, k] = decay * a.bias[s, k] + p.ais_bias[k] * kick * drive[k]
     kind = ais_class(w, s)
     if s < V:
         v = w.vessels

@@ -16,8 +16,8 @@ both.
 ais_bias_time), ``scan`` is ``sensors.radar`` or ``sensors.lidar`` (noise, bias, bias_time).  ``h`` is the time since
 the filter's own time of validity [s].  ``x`` and ``P`` are 1-D arrays that are changed in place.
 
-The same arrays hold the static filter of a target whose motion is unknown: states 2 to 6 and their covariances are
-zero, and the two axes, which then do not couple, share one covariance.
+The same arrays hold the static filter of a target whose motion is unknown: x = [N, E, bN, bE], and as the two axes do not
+couple and are measured alike, one covariance [pp, pb, bb] for both.
 """
 
 from __future__ import annotations
@@ -34,8 +34,6 @@ from .motion import column, correct, correct_row, predict_motion, start_motion
 YAW_RATE = math.radians(1.0)
 #: Smallest variance of a white error [m2, rad2, ..]: a sensor without noise must not divide by zero
 VARIANCE_MIN = 1e-8
-
-_N, _E, _BN_N, _BN, _BE_E, _BE = 0, 2, 28, 35, 37, 44  # packed entries that the static filter uses
 
 
 #: Time constant of forgetting in the line fit of ``tracker`` [s]
@@ -93,10 +91,10 @@ def _predict_bias(x, P, n, i, a, bias):
 @inner
 def predict_position(x, P, a, bias):
     """Move a static filter: only its sensor biases (standard deviation [m]) change, of which the share a is left."""
-    x[7] *= a
-    x[8] *= a
-    P[_BN_N] = P[_BE_E] = a * P[_BN_N]
-    P[_BN] = P[_BE] = a * a * P[_BN] + bias * bias * (1.0 - a * a)
+    x[2] *= a
+    x[3] *= a
+    P[1] *= a
+    P[2] = a * a * P[2] + bias * bias * (1.0 - a * a)
 
 
 @inner
@@ -145,18 +143,18 @@ def update_ais(x, P, n, e, psi, u, r, sensors):
 @inner
 def update_position(x, P, n, e, f, noise):
     """Fix n, e [m] into a static filter; noise is the white standard deviation [m] at f = 1."""
-    g0 = P[_N] + f * P[_BN_N]
-    g7 = P[_BN_N] + f * P[_BN]
-    s = 1.0 / (g0 + f * g7 + white(f, noise))
-    dn = s * (n - x[0] - f * x[7])
-    de = s * (e - x[1] - f * x[8])
-    x[0] += g0 * dn
-    x[1] += g0 * de
-    x[7] += g7 * dn
-    x[8] += g7 * de
-    P[_N] = P[_E] = P[_N] - s * g0 * g0
-    P[_BN_N] = P[_BE_E] = P[_BN_N] - s * g0 * g7
-    P[_BN] = P[_BE] = P[_BN] - s * g7 * g7
+    gp = P[0] + f * P[1]
+    gb = P[1] + f * P[2]
+    s = 1.0 / (gp + f * gb + white(f, noise))
+    dn = s * (n - x[0] - f * x[2])
+    de = s * (e - x[1] - f * x[3])
+    x[0] += gp * dn
+    x[1] += gp * de
+    x[2] += gb * dn
+    x[3] += gb * de
+    P[0] -= s * gp * gp
+    P[1] -= s * gp * gb
+    P[2] -= s * gb * gb
 
 
 @inner
@@ -226,15 +224,27 @@ def _update_ais(x, P, i, innovation, noise):
 @inner
 def init_position(x, P, n, e, variance, cross, bias):
     """Static filter at n, e [m]; per axis the variance [m2], its covariance with the bias, the bias's deviation [m]."""
-    for i in range(len(x)):
+    x[0] = n
+    x[1] = e
+    x[2] = x[3] = 0.0
+    P[0] = variance
+    P[1] = cross
+    P[2] = bias * bias
+
+
+@inner
+def expand(x, P):
+    """Turn the static filter into one of motion, of which nothing is known yet."""
+    bn, be, pp, pb, bb = x[2], x[3], P[0], P[1], P[2]
+    for i in range(2, len(x)):
         x[i] = 0.0
     for i in range(len(P)):
         P[i] = 0.0
-    x[0] = n
-    x[1] = e
-    P[_N] = P[_E] = variance
-    P[_BN_N] = P[_BE_E] = cross
-    P[_BN] = P[_BE] = bias * bias
+    x[7] = bn
+    x[8] = be
+    P[0] = P[2] = pp
+    P[28] = P[37] = pb
+    P[35] = P[44] = bb
 
 
 @inner
@@ -247,6 +257,7 @@ def init_fix(x, P, n, e, f, noise, bias):
 def init_scan_motion(x, P, n, e, f, psi, u, r, var_psi, var_u, var_r, sensors, scan):
     """Radar or LiDAR filter from one fix and a heading [rad], speed [m/s] and yaw rate [rad/s] known from elsewhere."""
     init_fix(x, P, n, e, f, scan.noise[0], scan.bias[0])
+    expand(x, P)
     start_motion(x, P, psi, u, r, var_psi, var_u, var_r, sensors)
 
 
@@ -254,6 +265,7 @@ def init_scan_motion(x, P, n, e, f, psi, u, r, var_psi, var_u, var_r, sensors, s
 def init_ais(x, P, n, e, psi, u, r, sensors):
     """AIS filter from the first message.  r may be NaN; psi and u may not (see ``tracker.track_ais``)."""
     init_fix(x, P, n, e, 1.0, sensors.ais_noise[0], sensors.ais_bias[0])
+    expand(x, P)
     rate = 0.0 if np.isnan(r) else r
     start_motion(x, P, psi, u, rate, 0.0, 0.0, YAW_RATE * YAW_RATE * sensors.inflation, sensors)
     for i in range(2, 5):

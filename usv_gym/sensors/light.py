@@ -84,12 +84,11 @@ def start(x, P, vn, ve, variance, age):
 
     age [s]: how long ago the velocity held, by which it correlates with the position.
     """
-    bn, be, pp, pb, bb = x[7], x[8], P[0], P[28], P[35]
+    bn, be, pb, bb = x[2], x[3], P[1], P[2]
     x[2] = vn
     x[3] = ve
     x[4] = bn
     x[5] = be
-    P[0] = pp
     P[1] = age * variance
     P[2] = variance
     P[3] = pb

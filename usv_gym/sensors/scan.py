@@ -10,16 +10,15 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from .. import rng
 from ..jit import inner, spliced
+from ..traffic.ships import place
 from ..trig import exp, hypot
 from ..world.state import LIDAR, MODEL_3DOF, RADAR
 from .clutter import false_alarms
 from .coastline import deliver_land, echo_land, hide_behind_land
 from .noise import pair_slot
-from .shadow import cast_shadows, look_around
+from .shadow import cast_shadows, look_around, look_at
 from .tdm import take_scan
 
 _SURE = 0.01  #: [m] more than rounding can make
@@ -51,47 +50,55 @@ def _decay(bias, bias_time, seconds):
 
 
 @inner
-def _remember(w, o, own, count, tick):
-    """Note after a LiDAR's look around how near the nearest source is that is not in reach, and how fast any may come."""
-    t, v, m = w.tracks, w.vessels, w.obstacles
-    t.clear_distance[o] = 0.0
-    if count > 0:
-        return
-    V = v.active.shape[0]
-    # numbers that are not negative have the order of their bits: whole numbers are compared in parallel
-    nearest = np.float64(math.inf).view(np.int64)
-    fastest = np.int64(0)
-    for s in range(w.ranges.shape[0]):
-        nearest = min(nearest, np.float64(w.ranges[s]).view(np.int64))
-    for s in range(V):
-        free = (v.active[s] != 0) & (v.model[s] == MODEL_3DOF) & (s != own)  # bound to nothing within a frame
-        speed2 = math.inf if free else v.velocity[s, 0] * v.velocity[s, 0] + v.velocity[s, 1] * v.velocity[s, 1]
-        fastest = max(fastest, np.float64(speed2 if v.active[s] != 0 else 0.0).view(np.int64))
-    for i in range(m.active.shape[0]):
-        speed2 = m.velocity[i, 0] * m.velocity[i, 0] + m.velocity[i, 1] * m.velocity[i, 1]
-        fastest = max(fastest, np.float64(speed2 if m.active[i] != 0 else 0.0).view(np.int64))
-    t.clear_tick[o] = tick
-    t.clear_from[o, 0], t.clear_from[o, 1] = v.eta[own, 0], v.eta[own, 1]
-    t.clear_distance[o] = math.sqrt(np.int64(nearest).view(np.float64))
-    t.clear_speed[o] = math.sqrt(np.int64(fastest).view(np.float64))
+def _moved(w, o, tick):
+    """How far [m] the own ship and any source may have come nearer to each other since the LiDAR last looked at all sources."""
+    t, weather, own = w.tracks, w.weather, w.observer[o]
+    current = weather.current_speed + weather.current_slow.limit if weather.current_speed > 0.0 else 0.0
+    moved = hypot(w.vessels.eta[own, 0] - t.looked_from[o, 0], w.vessels.eta[own, 1] - t.looked_from[o, 1])
+    moved += t.fastest[o] * ((tick - t.looked_tick[o]) * w.dt)
+    return moved + 2.0 * current * ((tick - w.frame_tick) * w.dt)  # what drifts, from the start of the frame to then and to now
 
 
 @inner
-def lidar_sees_nothing(w, tick):
-    """True if no source can have come into reach of any observer's LiDAR since it last looked around within this frame."""
-    t, weather = w.tracks, w.weather
-    reach = w.sensors.lidar.range * weather.lidar_range_factor
-    current = weather.current_speed + weather.current_slow.limit if weather.current_speed > 0.0 else 0.0
+def lidars_know(w, tick):
+    """True if the LiDAR of every observer knows which few sources it has to look at: within a frame ships move as foreseen."""
     for o in range(w.observer.shape[0]):
-        own = w.observer[o]
-        if t.clear_tick[o] < w.frame_tick:
-            return False
-        moved = hypot(w.vessels.eta[own, 0] - t.clear_from[o, 0], w.vessels.eta[own, 1] - t.clear_from[o, 1])
-        moved += t.clear_speed[o] * ((tick - t.clear_tick[o]) * w.dt)
-        moved += 2.0 * current * ((tick - w.frame_tick) * w.dt)  # what drifts, from the start of the frame to then and to now
-        if not moved + _SURE < t.clear_distance[o] - reach:
+        if w.tracks.looked_tick[o] < w.frame_tick or not _moved(w, o, tick) + _SURE < w.tracks.slack[o]:
             return False
     return True
+
+
+@inner
+def _remember(w, o, own, reach, tick):
+    """Note which sources may come into the LiDAR's reach soon."""
+    t, v, m = w.tracks, w.vessels, w.obstacles
+    V = v.active.shape[0]
+    fastest2 = 0.0
+    for s in range(V):
+        if v.active[s] and s != own:
+            # a vessel with forces is bound to nothing
+            speed2 = v.velocity[s, 0] * v.velocity[s, 0] + v.velocity[s, 1] * v.velocity[s, 1]
+            fastest2 = max(fastest2, math.inf if v.model[s] == MODEL_3DOF else speed2)
+    for i in range(m.active.shape[0]):
+        if m.active[i]:
+            fastest2 = max(fastest2, m.velocity[i, 0] * m.velocity[i, 0] + m.velocity[i, 1] * m.velocity[i, 1])
+    t.looked_tick[o] = tick
+    t.looked_from[o, 0], t.looked_from[o, 1] = v.eta[own, 0], v.eta[own, 1]
+    t.fastest[o] = math.sqrt(fastest2)
+    # as far as things come in a frame, about
+    own_speed = hypot(v.nu[own, 0], v.nu[own, 1])
+    t.slack[o] = _SURE + 1.5 * (own_speed + t.fastest[o] + w.weather.current_speed) * w.frame_ticks * w.dt
+    far2 = (reach + t.slack[o]) * (reach + t.slack[o])
+    t.close_count[o] = 0
+    for s in range(V + m.active.shape[0]):
+        if s < V:
+            dn, de, there = v.eta[s, 0] - v.eta[own, 0], v.eta[s, 1] - v.eta[own, 1], v.active[s] != 0 and s != own
+        else:
+            dn, de = m.position[s - V, 0] - v.eta[own, 0], m.position[s - V, 1] - v.eta[own, 1]
+            there = m.active[s - V] != 0
+        if there and dn * dn + de * de <= far2:
+            t.close[o, t.close_count[o]] = s
+            t.close_count[o] += 1
 
 
 @inner
@@ -105,10 +112,14 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
     if sensor.outage:
         return
     t.scan_found[o, k] = 0
-    # a LiDAR with the traffic elsewhere is one that sees nothing
-    count = look_around(w, own, reach) if w.traffic_tick == tick else 0
-    if k == LIDAR - 1 and w.traffic_tick == tick:
-        _remember(w, o, own, count, tick)
+    if w.traffic_tick == tick:
+        count = look_around(w, own, reach)
+        if k == LIDAR - 1:
+            _remember(w, o, own, reach, tick)
+    else:  # only for a LiDAR
+        for i in range(t.close_count[o]):
+            place(w, t.close[o, i], tick)
+        count = look_at(w, own, reach, t.close[o], t.close_count[o])
     cast_shadows(w, count)
     hide_behind_land(w, land, own, count)
     V = w.vessels.active.shape[0]

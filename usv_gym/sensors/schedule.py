@@ -6,7 +6,7 @@ from ..jit import inner, spliced
 from ..traffic.ships import move_traffic, place
 from ..world.state import MODEL_3DOF
 from .ais import NEVER, next_fire, schedule, transmit, transmits
-from .scan import deliver, lidar_sees_nothing, scan_lidar, scan_radar
+from .scan import deliver, lidars_know, scan_lidar, scan_radar
 from .tdm import publish, take_ais
 
 
@@ -19,21 +19,23 @@ def first_events(w):
         w.ais.next_tick[s] = NEVER
         if w.sensors.exteroceptive:
             schedule(w, s, w.tick)
-    w.ais_soonest = 0
+    w.ais_send = w.ais_due = 0
     _set_next(w, w.tick)
 
 
 @inner
-def _soonest_message(w, tick):
-    """First tick after ``tick`` at which an AIS message is sent or arrives."""
+def _schedule_messages(w, tick):
+    """Set the first ticks after ``tick`` at which an AIS message is sent, ``ais_send``, and arrives, ``ais_due``."""
     soonest = NEVER
     for s in range(w.ais.next_tick.shape[0]):
         soonest = min(soonest, w.ais.next_tick[s])
+    w.ais_send = soonest
+    soonest = NEVER
     for o in range(w.observer.shape[0]):
         for s in range(w.ais.next_tick.shape[0]):
             due = w.ais.due_tick[o, s]
             soonest = min(soonest, due if due > tick else NEVER)
-    return soonest
+    w.ais_due = soonest
 
 
 @inner
@@ -42,9 +44,9 @@ def _set_next(w, tick):
     p = w.sensors
     soonest = NEVER
     if p.exteroceptive:
-        if tick >= w.ais_soonest:
-            w.ais_soonest = _soonest_message(w, tick)
-        soonest = w.ais_soonest
+        if tick >= min(w.ais_send, w.ais_due):
+            _schedule_messages(w, tick)
+        soonest = min(w.ais_send, w.ais_due)
         for o in range(w.observer.shape[0]):
             for k in range(2):
                 if w.tracks.scan_due[o, k] > tick:
@@ -85,11 +87,11 @@ def sense(w, land, tick):
     radar = p.radar.on and _due(tick, w.dt_us, p.radar.period_us)
     lidar = p.lidar.on and _due(tick, w.dt_us, p.lidar.period_us)
     report = _due(tick, w.dt_us, p.tdm_period_us)
-    ais = tick >= w.ais_soonest
-    if radar or moves_observers(w) or (lidar and not lidar_sees_nothing(w, tick)):
+    sends, receives = tick >= w.ais_send, w.ais_due != NEVER
+    if radar or moves_observers(w) or (lidar and not lidars_know(w, tick)):
         move_traffic(w, tick)
     for make_room in (True, False):
-        if ais and not make_room:
+        if sends and not make_room:
             for s in range(S):
                 if tick >= w.ais.next_tick[s]:
                     if transmits(w, s):
@@ -101,7 +103,7 @@ def sense(w, land, tick):
         for o in range(w.observer.shape[0]):
             if w.vessels.active[w.observer[o]] == 0:
                 continue
-            if ais:
+            if (receives and (sends or tick >= w.ais_due)) or (sends and not make_room):
                 for s in range(S):
                     due = w.ais.due_tick[o, s]
                     if due >= 0 and (due <= tick or (make_room and tick >= w.ais.next_tick[s])):

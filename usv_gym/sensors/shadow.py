@@ -19,7 +19,9 @@ from ..world.geometry import half_width
 
 @inner
 def look_around(w, own, reach):
-    """Fill ranges, bearings, half_angles and widths (half the width shown) of all sources within ``reach`` metres of vessel ``own``.
+    """Fill ranges, bearings, half_angles and widths of all sources within ``reach`` metres of vessel ``own``.
+
+    A width is half of what the source shows [m].
 
     Returns how many there are; ``w.order[:count]`` are their indices, nearest first.
     """
@@ -40,33 +42,72 @@ def look_around(w, own, reach):
         w.ranges[V + i] = d2
         near += d2 <= reach2
     count = 0
-    if near == 0:
-        return count
-    for s in range(V + M):
-        if not w.ranges[s] <= reach2:
-            continue
+    if near > 0:
+        for s in range(V + M):
+            if w.ranges[s] <= reach2:
+                _note(w, n0, e0, s, count)
+                count += 1
+    return _work_out(w, count)
+
+
+@inner
+def look_at(w, own, reach, sources, n):
+    """The same of the first n of some sources, in rising order, all of which are there."""
+    v, m = w.vessels, w.obstacles
+    V = v.active.shape[0]
+    n0, e0 = v.eta[own, 0], v.eta[own, 1]
+    count = 0
+    for i in range(n):
+        s = sources[i]
         if s < V:
-            row = v.eta[s, 0] - n0, v.eta[s, 1] - e0, v.eta[s, 2], v.length[s], v.beam[s], 0.0
+            dn, de = v.eta[s, 0] - n0, v.eta[s, 1] - e0
         else:
-            row = m.position[s - V, 0] - n0, m.position[s - V, 1] - e0, 0.0, 0.0, 0.0, m.radius[s - V]
-        for i in range(6):
-            w.look[i, count] = row[i]
-        w.order[count] = s
-        count += 1
+            dn, de = m.position[s - V, 0] - n0, m.position[s - V, 1] - e0
+        if dn * dn + de * de <= reach * reach:
+            _note(w, n0, e0, s, count)
+            count += 1
+    return _work_out(w, count)
+
+
+@inner
+def _note(w, n0, e0, s, k):
+    """Source s is number k in reach of (n0, e0): write down what vector code needs of it."""
+    v, m, look = w.vessels, w.obstacles, w.look
+    V = v.active.shape[0]
+    w.order[k] = s
+    if s < V:
+        look[0, k] = v.eta[s, 0] - n0
+        look[1, k] = v.eta[s, 1] - e0
+        look[2, k] = v.eta[s, 2]
+        look[3, k] = v.length[s]
+        look[4, k] = v.beam[s]
+        look[5, k] = 0.0
+    else:
+        look[0, k] = m.position[s - V, 0] - n0
+        look[1, k] = m.position[s - V, 1] - e0
+        look[2, k] = look[3, k] = look[4, k] = 0.0
+        look[5, k] = m.radius[s - V]
+
+
+@inner
+def _work_out(w, count):
+    """Ranges, bearings and widths of the ``count`` sources that were noted, and their order; returns ``count``."""
+    look = w.look
     for k in range(count):  # vector code
-        dn, de = w.look[0, k], w.look[1, k]
+        dn, de = look[0, k], look[1, k]
         d = math.sqrt(dn * dn + de * de)
         bearing = atan2(de, dn)
-        width = w.look[5, k] + half_width(w.look[3, k], w.look[4, k], bearing - w.look[2, k])  # a hull's, or a disc's
-        w.look[6, k] = bearing
-        w.look[7, k] = atan2(width, d)
-        w.look[8, k] = width
+        width = look[5, k] + half_width(look[3, k], look[4, k], bearing - look[2, k])  # a disc's, or a hull's
+        look[6, k] = bearing
+        look[7, k] = atan2(width, d)
+        look[8, k] = width
+        look[9, k] = d
     for k in range(count):
         s = w.order[k]
-        w.ranges[s] = math.sqrt(w.ranges[s])
-        w.bearings[s] = w.look[6, k]
-        w.half_angles[s] = w.look[7, k]
-        w.widths[s] = w.look[8, k]
+        w.bearings[s] = look[6, k]
+        w.half_angles[s] = look[7, k]
+        w.widths[s] = look[8, k]
+        w.ranges[s] = look[9, k]
     _sort_by_range(w, count)
     return count
 

@@ -64,25 +64,27 @@ def _drop_silent(w, o, s, now_us):
 def _fused(w, o, s, now_us):
     """Fuse what is known of a target at ``now_us`` into w.estimate_x[0], w.estimate_p[0]; returns the phase."""
     t = w.tracks
-    x, p, y, q = w.estimate_x[0], w.estimate_p[0], w.estimate_x[1], w.estimate_p[1]
+    x, p = w.estimate_x[0], w.estimate_p[0]
     phase = PHASE_NONE
     for k in range(3):
         other = t.phase[o, s, k]
         if other == PHASE_NONE:
             continue
         seconds = (now_us - t.stamp_us[o, s, k]) * 1.0e-6
+        first = 0 if phase == PHASE_NONE else 1  # the first is where others are fused into
+        y, q = w.estimate_x[first], w.estimate_p[first]
         if w.sensors.light:
             if k == AIS:
                 light.predicted(t.x_ais[o, s], t.p_ais[o, s], other, seconds, w.sensors, y, q)
             else:
                 light.predicted(t.x_scan[o, k - 1, s], t.p_scan[o, k - 1, s], other, seconds, w.sensors, y, q)
-            phase = light.fuse(x, p, phase, y, q, other)
+            phase = light.fuse(x, p, phase, y, q, other) if first else other
             continue
         if k == AIS:
             predicted(t.x_ais[o, s], t.p_ais[o, s], other, seconds, w.sensors, y, q)
         else:
             predicted(t.x_scan[o, k - 1, s], t.p_scan[o, k - 1, s], other, seconds, w.sensors, y, q)
-        phase = fuse(x, p, phase, y, q, other)
+        phase = fuse(x, p, phase, y, q, other) if first else other
     return phase
 
 

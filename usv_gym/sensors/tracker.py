@@ -116,12 +116,20 @@ def track_scan(x, P, start, phase, h, n, e, f, sensors, scan):
 @inner
 def predicted(x, P, phase, h, sensors, X, Q):
     """Copy the motion of a local filter into X [>= 7], Q [>= 28] and move the copy by h [s], for publication."""
-    for i in range(7):
-        X[i] = x[i]
-    for i in range(28):
-        Q[i] = P[i]
     if phase == PHASE_MOTION:
+        for i in range(7):
+            X[i] = x[i]
+        for i in range(28):
+            Q[i] = P[i]
         predict_motion(X, Q, 7, h, sensors)
+    else:
+        for i in range(7):
+            X[i] = 0.0
+        for i in range(28):
+            Q[i] = 0.0
+        X[0] = x[0]
+        X[1] = x[1]
+        Q[0] = Q[2] = P[0]
 
 
 @inner
@@ -189,6 +197,7 @@ def _start_motion(x, P, start, sensors):
     if sensors.light:
         light.start(x, P, north, east, variance, age)
         return
+    ekf.expand(x, P)
     u = math.sqrt(north * north + east * east)
     yaw_rate = ekf.YAW_RATE * ekf.YAW_RATE * sensors.inflation
     start_motion(x, P, atan2(east, north), u, 0.0, variance / (u * u), variance, yaw_rate, sensors)

@@ -116,7 +116,7 @@ def _appear(w, tracks, j, k):
     r.changes[j] += 1
     if w.sensors.exteroceptive:
         schedule(w, j, w.tick)
-        w.ais_soonest = min(w.ais_soonest, w.ais.next_tick[j])
+        w.ais_send = min(w.ais_send, w.ais.next_tick[j])
         w.next_sense = min(w.next_sense, w.ais.next_tick[j])
 
 

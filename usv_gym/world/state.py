@@ -361,9 +361,10 @@ def _tracks(O: int, S: int) -> Dtype:
         ("measured_us", i8, (O, 2, S)),
         ("scan_found", i8, (O, 2)),  # how many measurements the last scan has
         ("scan_us", i8, (O, 2)), ("scan_due", i8, (O, 2)),  # stamp of the last scan; tick at which it arrives, -1: did
-        # the LiDAR's last look around, if it saw nothing: tick, from where N, E [m] {n}, distance to the nearest source [m],
-        # largest speed of any source [m/s]; until something may have come within reach, it need not look (sensors/scan.py)
-        ("clear_tick", i8, (O,)), ("clear_from", f8, (O, 2)), ("clear_distance", f8, (O,)), ("clear_speed", f8, (O,)),
+        # the LiDAR's last look at all sources (sensors/scan.py): tick, from where N, E [m] {n}, largest speed of any [m/s]; and
+        # which were within so many metres of its reach, the only ones to look at until things have moved so far
+        ("looked_tick", i8, (O,)), ("looked_from", f8, (O, 2)), ("fastest", f8, (O,)), ("slack", f8, (O,)),
+        ("close_count", i4, (O,)), ("close", i4, (O, S)),
         ("visible", i1, (O, 2, S)),  # whether the last scan of that sensor could see the source (truth of the sensor)
         # echoes of land: nearest point N, E [m] {n} in each bearing sector, NaN for none; second axis of 2: the scan under
         # way, the last that arrived
@@ -403,7 +404,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("tick", i8), ("dt_us", i8), ("dt", f8),
         ("frame_ticks", i8), ("frame_tick", i8),  # ticks per traffic frame; tick at which the current frame began
         ("traffic_tick", i8),  # tick to which positions of traffic refer
-        ("ais_soonest", i8),  # first tick at which any AIS message is sent or arrives
+        ("ais_send", i8), ("ais_due", i8),  # first tick at which any AIS message is sent, arrives
         ("next_sense", i8), ("next_nav", i8),  # first tick at which any exteroceptive sensor, any navigation sensor fires
         ("look_tick", i8),  # before which nobody reads the own navigation, but for the position (sensors/nav.py)
         ("seed", u8),
@@ -428,7 +429,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("steer_how", i1, (V,)), ("steer_north", f8, (V,)), ("steer_east", f8, (V,)), ("steer_heading", f8, (V,)),
         ("steer_speed", f8, (V,)), ("steered_rate", f8, (V,)), ("steered_velocity", f8, (2, V)),
         # work space of the shadow test (sensors/shadow.py)
-        ("slots", i8, (S,)), ("look", f8, (9, S)),  # rows that are vector code's, also of scans and transmissions
+        ("slots", i8, (S,)), ("look", f8, (10, S)),  # rows that are vector code's, also of scans and transmissions
         ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("widths", f8, (S,)),  # [m], [rad], [rad], [m]
         ("order", i4, (S,)), ("seen", i4, (S,)), ("hidden", i1, (S,)),
         ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)),
