@@ -6,6 +6,7 @@ import copy
 import multiprocessing
 import os
 import pickle
+import time
 
 import gymnasium as gym
 import numpy as np
@@ -16,6 +17,19 @@ from gymnasium.vector import AutoresetMode
 from usv_gym.config import ConfigError
 from usv_gym.envs.threads import Crew
 from usv_gym.envs.vector import USVVectorEnv
+from usv_gym.jit import lean_kernel
+from usv_gym.tasks.share import (
+    ALONE,
+    HELP,
+    LEAD,
+    NO_CONTROL,
+    UNFINISHED,
+    announce,
+    await_end,
+    await_work,
+    claim,
+    finish,
+)
 
 OPEN_SEA, SCENARIO = "usv_gym/OpenSea-v0", "usv_gym/Scenario-v0"
 SHORT = ["simulation.duration=12"]  # many autoresets in few steps
@@ -261,28 +275,53 @@ def test_threads_change_no_bit(kwargs):
     threaded.close()
 
 
-def test_a_crew_does_every_row_once():
-    for size, rows in ((1, 5), (2, 100), (4, 7), (3, 1000)):
+@lean_kernel
+def count_groups(control, role, counts, spins):
+    """Share the groups [G] out as ``run_batch`` does; each is ``spins`` long and is counted."""
+    groups = counts.shape[0]
+    if role == LEAD:
+        announce(control)
+    while role != HELP or await_work(control, groups):
+        had = 0
+        while True:
+            group = claim(control, role, groups, had)
+            if group < 0:
+                break
+            had += 1
+            for _ in range(spins):
+                counts[group] = 7 * counts[group] % 1000003
+            counts[group] += 1
+            finish(control, role)
+        if role == LEAD and not await_end(control, groups):
+            return UNFINISHED
+        if role != HELP:
+            break
+    return -1
+
+
+@pytest.mark.parametrize("spins", [0, 10_000])  # the longer ones keep the leader waiting beyond its patience
+def test_a_crew_does_every_group_once(spins):
+    count_groups(NO_CONTROL, ALONE, np.zeros(1, np.int64), 0)
+    for size, groups in ((1, 5), (2, 100), (4, 7), (3, 200)):
+        alone, shared = np.zeros(groups, np.int64), np.zeros(groups, np.int64)
         crew = Crew(size)
-        count = np.zeros(rows, int)
-
-        def work(part, count=count):
-            count[part] += 1
-
-        for _ in range(20):
-            crew.share(rows, 8, work)
-        assert (count == 20).all()
+        for k in range(40):
+            count_groups(NO_CONTROL, ALONE, alone, spins)
+            assert crew.run(count_groups, shared, spins) == -1
+            np.testing.assert_array_equal(shared, alone)
+            if k % 10 == 9:
+                time.sleep(0.002)  # so that the helpers fall asleep
         crew.close()
 
 
-def test_a_crew_hands_on_errors():
-    crew = Crew(2)
-
-    def work(part):
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        crew.share(100, 8, work)
+def test_a_crew_changes_its_work():
+    """Other arguments: helpers that still wait for more of the old work never touch the new."""
+    crew = Crew(3)
+    work = [np.zeros(50, np.int64) for _ in range(4)]
+    for _ in range(25):
+        for counts in work:
+            crew.run(count_groups, counts, 0)
+    assert all((counts == 25).all() for counts in work)
     crew.close()
 
 

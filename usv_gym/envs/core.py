@@ -20,9 +20,9 @@ from ..scenarios.families.failures import sample_failures
 from ..scenarios.land import scenario_coast
 from ..scenarios.loader import Source, load_scenario
 from ..scenarios.schema import Scenario, Weather
+from ..tasks.share import ALONE, NO_CONTROL
 from ..tasks.step import BEGIN, STEP, observe_batch, run_batch
 from ..tasks.task import (
-    DISCRETE,
     OUTCOMES,
     TERMS,
     TaskConfig,
@@ -37,7 +37,7 @@ from ..tasks.task import (
 from ..units import DEG
 from ..world.disturbance import set_weather
 from ..world.land import Coast, land_pool
-from ..world.lanes import LANES, lanes_for
+from ..world.lanes import lanes_for
 from ..world.state import A, capacity
 from ..world.vessel import VesselModel, load_vessel
 from .threads import Crew
@@ -299,19 +299,10 @@ class Core:
             raise ValueError(f"action {self.actions[bad].tolist()}{row}: expected {expected}")
 
     def _run(self, rows: NDArray[np.float64]) -> int:
-        if self.crew.size == 1 or np.count_nonzero(self._what) < _WORTH_SHARING or not self._plausible():
-            return int(
-                run_batch(self.worlds, self._lanes, self.land, self.tracks, self.task, self._episodes, self._obs, rows)
-            )
-        self.crew.share(self.num, LANES, lambda part: run_batch(
-            self.worlds[part], self._lanes[part.start // LANES :], self.land, self.tracks, self.task, self._episodes[part],
-            self._obs[part], rows))  # fmt: skip
-        return -1
-
-    def _plausible(self) -> bool:
-        """Whether all actions can be carried out; if not, one call has to find the bad row before any row moves."""
-        return bool((np.isin(self.actions, range(len(DISCRETE))) if self.config.action == "discrete"
-                     else np.isfinite(self.actions)).all())  # fmt: skip
+        arguments = (self.worlds, self._lanes, self.land, self.tracks, self.task, self._episodes, self._obs, rows)
+        if self.crew.size == 1 or rows is not NO_ROWS or np.count_nonzero(self._what) < _WORTH_SHARING:
+            return int(run_batch(NO_CONTROL, ALONE, *arguments))
+        return int(self.crew.run(run_batch, *arguments))
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""
@@ -350,17 +341,19 @@ class Core:
             "is_success": outcome == "arrival",
         }
 
-    def infos(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
+    def infos(self, mask: NDArray[np.bool_], everyone: bool = False, over: bool = True) -> dict[str, Any]:
         """The info dicts of the rows of ``mask`` [B] as Gymnasium's vector environments batch them.
+
+        ``everyone``: the mask is known to be all true; not ``over``: no episode is known to have ended.
 
         Every key has an array [B], with zeros (None among texts) in the other rows, and a mask under ``_key``.
         """
         terms = self.terms.T.copy()
         outcome = self._outcome.copy()
         time, closest, to_go = self._tick * self._dt, self._closest.copy(), self._to_go.copy()
-        texts = _OUTCOME_TEXTS[outcome] if outcome.any() else self._no_texts.copy()
+        texts = _OUTCOME_TEXTS[outcome] if over else self._no_texts.copy()
         success = outcome == _ARRIVAL
-        if not mask.all():
+        if not (everyone or mask.all()):
             others = ~mask
             terms[:, others] = 0.0
             texts[others] = None

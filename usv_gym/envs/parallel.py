@@ -19,6 +19,7 @@ from ..config import ConfigError
 from ..jit import compiling
 from ..scenarios.build import build_worlds, track_pool, write_agent
 from ..scenarios.loader import load_scenario
+from ..tasks.share import ALONE, NO_CONTROL
 from ..tasks.step import BEGIN, STEP, run_batch
 from ..tasks.task import (
     OUTCOMES,
@@ -156,9 +157,13 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self._draw(self._rng)
         self._episodes["what"] = BEGIN
         with compiling():
-            run_batch(self.worlds, self._lanes, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS)
+            self._run()
         self.agents = list(self.possible_agents)
         return self._observations(self.agents), {agent: {"scales": self._scales(agent)} for agent in self.agents}
+
+    def _run(self) -> int:
+        return int(run_batch(NO_CONTROL, ALONE, self.worlds, self._lanes, NO_LAND, self._tracks, self._tasks, self._episodes,
+                             self._obs, NO_ROWS))  # fmt: skip
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """One control step of all agents that are left.
@@ -181,7 +186,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
             width = int(self._tasks["channels"][self._slot[agent]])
             episodes["action"][self._slot[agent], :width] = action
         self._episodes["what"] = STEP
-        if run_batch(self.worlds, self._lanes, NO_LAND, self._tracks, self._tasks, self._episodes, self._obs, NO_ROWS) >= 0:
+        if self._run() >= 0:
             raise ValueError(f"actions {dict(actions)!r}: expected finite numbers, and whole ones from 0 to 4 for discrete")
         slots = {agent: self._slot[agent] for agent in here}
         rewards = {agent: float(episodes["reward"][k]) for agent, k in slots.items()}

@@ -1,38 +1,45 @@
-"""Rows shared out among threads, for kernels that leave the interpreter lock alone."""
+"""Rows shared out among threads, by a kernel that leaves the interpreter lock alone and shares by itself (tasks/step.py).
+
+A thread that has to be woken comes 20 to 50 microseconds late, as long as the work of dozens of worlds.  So helpers stay in the
+kernel for a moment after their work is done, and are there when the next step comes at once; else they sleep until called.
+"""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections import deque
 from collections.abc import Callable
 from queue import SimpleQueue
+from typing import Any
 
-#: chunks of rows per thread: enough that a thread which the machine holds up costs little
-_CHUNKS = 4
+import numpy as np
+
+from ..tasks.share import CONTROLS, HELP, LEAD, STOP, TAKEN, UNFINISHED
+
+_NEVER = np.iinfo(np.int64).max // 2
 
 
-class _Job:
-    """Slices that are left, who has come to work on them, and what went wrong."""
+class _Helper:
+    """One thread, asleep until it is called."""
 
-    def __init__(self, slices: list[slice], work: Callable[[slice], object]) -> None:
-        self.left = deque(slices)
-        self.work = work
-        self.places: deque[None] = deque()  # for helpers who have yet to come
-        self.done: SimpleQueue[BaseException | None] = SimpleQueue()
+    def __init__(self, name: str) -> None:
+        self.calls: SimpleQueue[tuple[Callable[..., int], tuple[Any, ...]] | None] = SimpleQueue()
+        self.asleep = threading.Event()
+        self.asleep.set()
+        threading.Thread(target=self._live, name=name, daemon=True).start()
 
-    def labour(self, place: int) -> None:
-        """Work until nothing is left: the caller (place 0) from the front, helpers from the back.
+    def call(self, kernel: Callable[..., int], arguments: tuple[Any, ...]) -> None:
+        """Wake it, if it sleeps; one that is about to fall asleep comes next time."""
+        if self.asleep.is_set():
+            self.asleep.clear()
+            self.calls.put((kernel, arguments))
 
-        So each thread comes back to nearly the same rows from call to call, which are in its own cache.
-        """
-        take = self.left.pop if place else self.left.popleft
-        while True:
-            try:
-                part = take()  # atomic
-            except IndexError:
-                return
-            self.work(part)
+    def _live(self) -> None:
+        while (call := self.calls.get()) is not None:
+            kernel, arguments = call
+            kernel(*arguments)
+            del call, kernel, arguments
+            self.asleep.set()
 
 
 class Crew:
@@ -42,71 +49,51 @@ class Crew:
     """
 
     def __init__(self, size: int) -> None:
-        self._calls: list[SimpleQueue[_Job | None]] = []
-        self._process = 0
+        self._forget()
         if not isinstance(size, int) or size < 1:
             raise ValueError(f"num_threads: expected a whole number of at least 1, got {size!r}")
         self.size = size
 
-    def share(self, rows: int, unit: int, work: Callable[[slice], object]) -> None:
-        """Call ``work`` on slices that cover ``range(rows)``, all but the last a multiple of ``unit`` rows.
+    def _forget(self) -> None:
+        self._helpers: list[_Helper] = []
+        self._process = 0
+        self._arguments: tuple[Any, ...] = ()
+        self._control = np.zeros(CONTROLS, np.int64)
 
-        Each thread takes the next slice when it is done with its last.
-        """
-        chunk = -(-rows // (_CHUNKS * self.size * unit)) * unit
-        job = _Job([slice(low, min(low + chunk, rows)) for low in range(0, rows, chunk)], work)
-        helpers = self._helpers()[: len(job.left) - 1]
-        job.places.extend([None] * len(helpers))
-        for call in helpers:
-            call.put(job)
-        came = len(helpers)
-        try:
-            job.labour(0)
-        finally:
-            while job.places:  # those who have not come are not waited for
-                try:
-                    job.places.pop()
-                    came -= 1
-                except IndexError:
-                    break
-            errors = [job.done.get() for _ in range(came)]
-        for error in errors:
-            if error is not None:
-                raise error
+    def run(self, kernel: Callable[..., int], *arguments: Any) -> int:
+        """``kernel(control, LEAD, *arguments)``, while the others call it with HELP and the same arguments."""
+        if self._process != os.getpid():
+            self._forget()
+            self._process = os.getpid()
+            self._helpers = [_Helper(f"usv_gym-{k + 1}") for k in range(self.size - 1)]
+        if len(arguments) != len(self._arguments) or any(a is not b for a, b in zip(arguments, self._arguments, strict=True)):
+            self._control[STOP] = 1  # helpers who still wait for more of the old work
+            self._control = np.zeros(CONTROLS, np.int64)
+            self._control[TAKEN] = _NEVER
+            self._arguments = arguments
+        for helper in self._helpers:
+            helper.call(kernel, (self._control, HELP, *arguments))
+        result = kernel(self._control, LEAD, *arguments)
+        if result == UNFINISHED:
+            for helper in self._helpers:
+                helper.asleep.wait()
+            return -1
+        return result
 
     def close(self) -> None:
         """Let the threads go; the next use makes new ones."""
+        self._control[STOP] = 1
         if self._process == os.getpid():
-            for call in self._calls:
-                call.put(None)
-        self._calls = []
+            for helper in self._helpers:
+                helper.calls.put(None)
+        self._forget()
 
-    def _helpers(self) -> list[SimpleQueue[_Job | None]]:
-        if len(self._calls) != self.size - 1 or self._process != os.getpid():
-            self._calls = [SimpleQueue() for _ in range(self.size - 1)]
-            self._process = os.getpid()
-            for k, call in enumerate(self._calls):
-                threading.Thread(target=_help, args=(call,), name=f"usv_gym-{k + 1}", daemon=True).start()
-        return self._calls
+    def __getstate__(self) -> dict[str, Any]:
+        return {"size": self.size}
 
-    def __getstate__(self) -> dict[str, object]:
-        return {"size": self.size, "_calls": [], "_process": 0}
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._forget()
+        self.size = state["size"]
 
     def __del__(self) -> None:
         self.close()
-
-
-def _help(calls: SimpleQueue[_Job | None]) -> None:
-    """The life of a helper: come when called, as long as there is a place left in the job."""
-    while (job := calls.get()) is not None:
-        try:
-            job.places.pop()
-        except IndexError:
-            continue
-        error: BaseException | None = None
-        try:
-            job.labour(1)
-        except BaseException as raised:  # handed to the caller
-            error = raised
-        job.done.put(error)
-        del job

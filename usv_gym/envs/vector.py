@@ -180,6 +180,7 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         self._all_started = False
         self._action_shape = self.action_space.shape
         self._ended = np.zeros(num_envs, np.bool_)
+        self._any_ended = False
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -251,19 +252,20 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
         self._started[mask] = True
         self._all_started = bool(self._started.all())
         self._ended = self._ended & ~mask
+        self._any_ended = bool(self._ended.any())
         return self.observation(), self._reset_infos(self.core.infos(mask), mask)
 
     def step(self, actions: Any) -> Step:
         """Advance all rows by one control interval; see ``autoreset_mode`` for those whose episode has ended."""
-        core, ended = self.core, self._ended
+        core, ended, any_ended = self.core, self._ended, self._any_ended
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
-            if ended.any():
+            if any_ended:
                 self.advance(actions, ~ended)
                 self.begin(ended)
             else:
                 self.advance(actions)
         elif self.autoreset_mode is AutoresetMode.DISABLED:
-            if ended.any():
+            if any_ended:
                 raise gym.error.ResetNeeded(
                     f"the episodes of rows {np.flatnonzero(ended).tolist()} have ended: reset them with "
                     "reset(options={'reset_mask': mask})"
@@ -273,19 +275,22 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
             self.advance(actions)
         reward, terminated, truncated = core.reward.copy(), core.terminated.copy(), core.truncated.copy()
         over = terminated | truncated
+        any_over = bool(over.any())
         infos: dict[str, Any] = {}
-        restarted = ended
+        restarted, any_restarted = ended, any_ended
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            restarted = over
-            if over.any():
+            restarted, any_restarted = over, any_over
+            if any_over:
                 last = np.full(self.num_envs, None, object)
                 for b in np.flatnonzero(over).tolist():
                     last[b] = self.observation(b)
                 infos = masked({"final_obs": last, "final_info": core.infos(over)}, over)
                 self.begin(over)
-        self._ended = over
-        infos.update(core.infos(self._all.copy()))
-        return self.observation(), reward, terminated, truncated, self._reset_infos(infos, restarted)
+        self._ended, self._any_ended = over, any_over
+        infos.update(core.infos(self._all.copy(), everyone=True, over=any_over))
+        if any_restarted:
+            self._reset_infos(infos, restarted)
+        return self.observation(), reward, terminated, truncated, infos
 
     def observation(self, rows: int | slice = slice(None)) -> Any:
         """A copy of the observations as they are now, batched, or of one row."""

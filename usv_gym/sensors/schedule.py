@@ -69,7 +69,7 @@ def _due(tick, dt_us, period_us):
 @inner
 def moves_observers(w):
     """True if an observer's vessel moves with the traffic."""
-    for o in range(w.observer.shape[0]):
+    for o in range(w.observer.shape[0]):  # noqa: SIM110 (numba knows no any())
         if w.vessels.model[w.observer[o]] != MODEL_3DOF:
             return True
     return False
@@ -79,7 +79,8 @@ def moves_observers(w):
 def sense(w, land, tick):
     """Fire everything that is due at ``tick``: transmissions, receptions, scans, then the TDM's report.
 
-    The traffic is carried to this tick if somebody looks at it.  There is room for one message of each source and for one scan under way: what is later than that arrives just before
+    The traffic is carried to this tick if somebody looks at it.
+    There is room for one message of each source and for one scan under way: what is later than that arrives just before
     the next one is made.
     """
     p = w.sensors

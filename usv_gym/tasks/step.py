@@ -13,6 +13,7 @@ from ..units import DEG
 from ..world.autopilot import autopilot, mix
 from ..world.lanes import LANES, clear, gather_command
 from .observe import cross_track_error, observe
+from .share import HELP, LEAD, UNFINISHED, announce, await_end, await_work, claim, finish
 from .task import ACTION_CHANNELS, ACTION_DEMAND, ACTION_DISCRETE, DISCRETE, HEADING_SPAN
 
 _TURN, _FASTER = DISCRETE[2][0] * DEG, DISCRETE[3][1]
@@ -229,31 +230,49 @@ def _possible(task, action):
 
 
 @lean_kernel
-def run_batch(worlds, lanes, land, tracks, tasks, episodes, obs, rows):
+def run_batch(control, role, worlds, lanes, land, tracks, tasks, episodes, obs, rows):
     """Begin an episode in the rows that ask for BEGIN, make a control step in those that ask for STEP, leave the others.
 
-    worlds [B]; lanes, the room that ``lanes_for(worlds)`` makes; land, the pool that their ``land_id`` count in (world/land.py); tasks [O], one per observer; episodes [B, O]
-    with ``what`` (of observer 0) and ``action`` as input and the rest as result; obs [B, O, size] float32, written;
-    rows [ticks, n, A, 3] (see engine.advance_worlds).
-    Returns -1, or the first row with an action that is not finite or none of ``discrete``; then nothing at all has moved.
-    (One entry point for both, because what they share is then compiled once.)
+    control, role: see ``tasks.share``; ALONE needs no control.  worlds [B]; lanes, the room that ``lanes_for(worlds)`` makes;
+    land, the pool that their ``land_id`` count in (world/land.py); tracks, that of recorded tracks; tasks [O], one per
+    observer; episodes [B, O] with ``what`` (of observer 0) and ``action`` as input and the rest as result; obs [B, O, size]
+    float32, written; rows [ticks, n, A, 3] (see engine.advance_worlds).
+    Returns -1 (UNFINISHED where helpers are at work yet), or the first row with an action that is not finite or none of
+    ``discrete``; then nothing at all has moved.
+    (One entry point for all, because what they share is then compiled once.)
     """
     O = episodes.shape[1]
-    for b in range(worlds.shape[0]):
-        if episodes[b, 0].what == STEP:
-            for o in range(O):
-                if worlds[b].vessels.active[worlds[b].observer[o]] and not _possible(tasks[o], episodes[b, o].action):
-                    return b
-    for b in range(worlds.shape[0]):
-        if episodes[b, 0].what == BEGIN:
-            begin_episodes(worlds[b], land, tracks, tasks, episodes[b])
-    for first in range(0, worlds.shape[0], LANES):
-        last = min(first + LANES, worlds.shape[0])
-        step_group(worlds[first:last], lanes[first // LANES], land, tracks, tasks, episodes[first:last], rows)
-        for b in range(first, last):
-            if episodes[b, 0].what != 0:
+    groups = lanes.shape[0]
+    if role != HELP:
+        for b in range(worlds.shape[0]):
+            if episodes[b, 0].what == STEP:
                 for o in range(O):
-                    observe(worlds[b], land, o, tasks[o], obs[b, o])
+                    # in this order, as actions are all in one place
+                    if not _possible(tasks[o], episodes[b, o].action) and worlds[b].vessels.active[worlds[b].observer[o]]:
+                        return b
+    if role == LEAD:
+        announce(control)
+    while role != HELP or await_work(control, groups):
+        had = 0
+        while True:
+            group = claim(control, role, groups, had)
+            if group < 0:
+                break
+            had += 1
+            first, last = LANES * group, min(LANES * (group + 1), worlds.shape[0])
+            for b in range(first, last):
+                if episodes[b, 0].what == BEGIN:
+                    begin_episodes(worlds[b], land, tracks, tasks, episodes[b])
+            step_group(worlds[first:last], lanes[group], land, tracks, tasks, episodes[first:last], rows)
+            for b in range(first, last):
+                if episodes[b, 0].what != 0:
+                    for o in range(O):
+                        observe(worlds[b], land, o, tasks[o], obs[b, o])
+            finish(control, role)
+        if role == LEAD and not await_end(control, groups):
+            return UNFINISHED
+        if role != HELP:
+            break
     return -1
 
 

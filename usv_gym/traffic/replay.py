@@ -72,6 +72,8 @@ def begin_replay(w, tracks):
 @inner
 def replay(w, tracks, seconds):
     """Steer every replayed ship through the frame of so many seconds that begins; let ships appear, vanish, be handed over."""
+    if tracks.shape[0] == 0:
+        return
     v, r = w.vessels, w.replays
     end_us = w.tick * w.dt_us + w.frame_ticks * w.dt_us
     for j in range(v.active.shape[0]):

@@ -20,8 +20,8 @@ EULER_STEP = 0.05  #: [s] step per command row of the preset `original`
 def prepare_lags(w, p, h):
     """Write which share of the way to its reference each lag of plant p covers in h seconds, before lanes are gathered.
 
-    The lag is exact for a constant command, 1 - exp(-h / T).  With ``euler_actuators`` every call of ``actuate`` is one explicit
-    Euler step of 0.05 s, whatever h is: the original stepped its actuators once per message.
+    The lag is exact for a constant command, 1 - exp(-h / T).  With ``euler_actuators`` every call of ``actuate`` is one
+    explicit Euler step of 0.05 s, whatever h is: the original stepped its actuators once per message.
     """
     q = w.plants
     if q.lag_step[p] == h:

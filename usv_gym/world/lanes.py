@@ -1,9 +1,9 @@
 """Vessels of several worlds side by side, so that their physics become vector code.
 
 One record of ``lanes_dtype`` holds plant p of up to LANES worlds, each number a row [LANES], with the weather of those worlds.
-``gather`` copies one lane from its world's record, ``actuators``, ``disturbance`` and ``dynamics`` advance all lanes at once, and
-``scatter`` writes a lane back; a lane's numbers never depend on its neighbours, and a world alone takes one lane of eight, so
-that it sails as it does in any batch.
+``gather`` copies one lane from its world's record, ``actuators``, ``disturbance`` and ``dynamics`` advance all lanes at once,
+and ``scatter`` writes a lane back; a lane's numbers never depend on its neighbours, and a world alone takes one lane of eight,
+so that it sails as it does in any batch.
 
 All loops run over all LANES, idle ones included, and have no branch: numbers are chosen, not jumped to.  Rows are 64 bytes,
 eight times eight, which is what lets LLVM prove that no lane reads what another writes.
@@ -15,9 +15,8 @@ import functools
 from typing import Any
 
 import numpy as np
-from numba import literal_unroll
 
-from ..jit import inner
+from ..jit import inner, line_by_line
 from ..trig import sincos
 from .state import MODEL_3DOF, A, Dtype, f8, i8, u8
 
@@ -50,7 +49,8 @@ def lanes_dtype() -> Dtype:
     process = np.dtype([(name, f8, row) for name in ("limit", "decay", "kick", "x")])
     return np.dtype([
         # of the group: most thrusters of any lane; whether any has weather, waves, the preset `original`, fluid memory, a plant
-        ("thrusters", i8), ("any_weather", i8), ("any_waves", i8), ("any_original", i8), ("any_memory", i8), ("any_plant", i8), ("_", i8, (2,)),
+        ("thrusters", i8), ("any_weather", i8), ("any_waves", i8), ("any_original", i8), ("any_memory", i8), ("any_plant", i8),
+        ("_", i8, (2,)),
         # of the engine: whether the world of the lane is under way, and tick at which something besides its plants is due
         ("under_way", i8, row), ("due", i8, row),
         ("slot", i8, row),  # vessel slot that has the plant; -1: none, so only the weather of the lane is of account
@@ -75,6 +75,14 @@ def lanes_for(worlds: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Room for the lanes of worlds [B]: [ceil(B / LANES), P]."""
     plants = worlds.dtype["plants"]["thrusters"].shape[0]
     return np.zeros((-(-len(worlds) // LANES), plants), lanes_dtype())
+
+
+_copy_weather = line_by_line("g, l, weather", "g.{0}[l] = weather.{0}", _WEATHER)
+_copy_processes = line_by_line("g, l, weather", "; ".join(
+    f"g.{{0}}.{field}[l] = weather.{{0}}.{field}" for field in ("limit", "decay", "kick", "x")), _PROCESSES)  # fmt: skip
+_write_processes = line_by_line("g, l, weather", "weather.{0}.x = g.{0}.x[l]", _PROCESSES)
+_copy_plant = line_by_line("g, l, q, p", "g.{0}[l] = q.{0}[p]", _PLANT)
+_copy_thruster = line_by_line("g, l, q, p, i", "g.{0}[i, l] = q.{0}[p, i]", _THRUSTER)
 
 
 @inner
@@ -106,13 +114,8 @@ def gather(g, l, w, p):
     g.h[l] = w.dt
     g.seed[l] = w.seed
     g.on[l] = 1.0 if weather.on else 0.0
-    for name in literal_unroll(_WEATHER):
-        g[name][l] = weather[name]
-    for name in literal_unroll(_PROCESSES):
-        g[name].limit[l] = weather[name].limit
-        g[name].decay[l] = weather[name].decay
-        g[name].kick[l] = weather[name].kick
-        g[name].x[l] = weather[name].x
+    _copy_weather(g, l, weather)
+    _copy_processes(g, l, weather)
     g.current[0, l] = weather.current[0]
     g.current[1, l] = weather.current[1]
     if weather.on:
@@ -126,8 +129,7 @@ def gather(g, l, w, p):
     if weather.on and weather.wave_height > 0.0:
         g.any_waves = 1
     g.thrusters = max(g.thrusters, np.int64(q.thrusters[p]))
-    for name in literal_unroll(_PLANT):
-        g[name][l] = q[name][p]
+    _copy_plant(g, l, q, p)
     for k in range(3):
         g.coriolis[k, l] = q.coriolis[p, k]
         g.wave_gain[k, l] = q.wave_gain[p, k]
@@ -137,8 +139,7 @@ def gather(g, l, w, p):
         g.eta[k, l] = v.eta[j, k]
         g.nu[k, l] = v.nu[j, k]
     for i in range(A):
-        for name in literal_unroll(_THRUSTER):
-            g[name][i, l] = q[name][p, i]
+        _copy_thruster(g, l, q, p, i)
         g.lag[i, 0, l] = 0.0 if q.jet_stuck[p, i] else q.lag[p, i, 0]
         g.lag[i, 1, l] = 0.0 if q.nozzle_stuck[p, i] else q.lag[p, i, 1]
         g.lag[i, 2, l] = 0.0 if q.jet_stuck[p, i] else q.lag[p, i, 2]
@@ -194,8 +195,7 @@ def scatter(g, l, w, p):
     """Write all that has changed in lane l into its world, whose plant p it is."""
     weather, q = w.weather, w.plants
     scatter_motion(g, l, w)
-    for name in literal_unroll(_PROCESSES):
-        weather[name].x = g[name].x[l]
+    _write_processes(g, l, weather)
     j = g.slot[l]
     if j < 0:
         return
