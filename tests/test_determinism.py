@@ -202,6 +202,8 @@ def test_inactive_slots_change_no_bit(monkeypatch):
     assert np.flatnonzero(tracked).tolist() == [1, 2, 20, 21, 22]
     for group in ("vessels", "routes", "obstacles", "plants", "weather", "safety", "nav", "ais", "tracks", "picture"):
         for name in small.worlds[group].dtype.names:
+            if name == "close":  # numbers of slots
+                continue
             a, b = small.worlds[group][name][0], large.worlds[group][name][0]
             for axis, (n, m) in enumerate(zip(a.shape, b.shape, strict=True)):
                 if n != m:

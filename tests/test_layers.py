@@ -14,7 +14,7 @@ PACKAGE = Path(usv_gym.__file__).parent
 
 #: from the ground up.  A module imports from the layers below, and within its own layer from what stands left of it
 LAYERS = (
-    "units resources config jit trig rng",  # no domain knowledge
+    "units resources config jit atomic trig rng",  # no domain knowledge
     "world",  # truth
     "sensors traffic",  # the picture; how ships move
     "events engine scenarios",  # one tick; where worlds come from

@@ -15,8 +15,9 @@ from .jit import inner, lean_kernel, spliced
 from .sensors.nav import navigate
 from .sensors.schedule import first_events, moves_observers, sense
 from .traffic.replay import begin_replay, replay
-from .traffic.ships import follow_route, move_traffic, steer
+from .traffic.ships import follow_route, steer
 from .world.actuators import actuate, prepare_lags
+from .world.carry import move_traffic
 from .world.disturbance import wave_step, weather_reset, weather_step
 from .world.dynamics import sail
 from .world.lanes import LANES, clear, gather, scatter, scatter_motion

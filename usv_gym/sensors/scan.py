@@ -12,8 +12,8 @@ import math
 
 from .. import rng
 from ..jit import inner, spliced
-from ..traffic.ships import place
 from ..trig import exp, hypot
+from ..world.carry import place
 from ..world.state import LIDAR, MODEL_3DOF, RADAR
 from .clutter import false_alarms
 from .coastline import deliver_land, echo_land, hide_behind_land

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..jit import inner, spliced
-from ..traffic.ships import move_traffic, place
+from ..world.carry import move_traffic, place
 from ..world.state import MODEL_3DOF
 from .ais import NEVER, next_fire, schedule, transmit, transmits
 from .scan import deliver, lidars_know, scan_lidar, scan_radar

@@ -7,10 +7,10 @@ import math
 from ..colregs.duty import rule_terms
 from ..engine import attend, board, disembark, reset_world, tick_lanes
 from ..jit import inner, lean_kernel, spliced
-from ..traffic.ships import move_traffic
 from ..trig import clip, hypot, wrap
 from ..units import DEG
 from ..world.autopilot import autopilot, mix
+from ..world.carry import move_traffic
 from ..world.lanes import LANES, clear, gather_command
 from .observe import cross_track_error, observe
 from .share import HELP, LEAD, UNFINISHED, announce, await_end, await_work, claim, finish
