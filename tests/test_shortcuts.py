@@ -34,8 +34,8 @@ CLOSE = {
 }  # fmt: skip
 #: work space, and what the LiDAR remembers; how far ships have sailed, which is added up at every look
 LEFT_OUT = (
-    "look", "slots", "seen", "order", "hidden", "ranges", "bearings", "half_angles", "widths", "lit_from", "lit_to", "near", "end",
-    "hull", "estimate_x", "estimate_p", "elapsed", "decay", "fade", "slowness",
+    "look", "slots", "seen", "order", "hidden", "ranges", "bearings", "half_angles", "widths", "lit_from", "lit_to", "near",
+    "end", "hull", "estimate_x", "estimate_p", "elapsed", "decay", "fade", "slowness",
     "look_tick", "looked_tick", "looked_from", "slack", "fastest", "close", "close_count", "distance",
 )  # fmt: skip
 
