@@ -29,6 +29,7 @@ from ..tasks.task import (
     Vessel,
     action_space,
     episode_dtype,
+    named_terms,
     observation_size,
     observation_space,
     resolve_action,
@@ -135,7 +136,7 @@ class Core:
         self._no_texts = np.full(self.num, OUTCOMES[0], object)
         self._tick = self.worlds["tick"]
         # by row, for the single environment: making a view costs as much as half a kernel call
-        self._rows = list(zip(self.obs, self.actions, self.terms, strict=True))
+        self.row_obs, self.row_actions, self._row_terms = list(self.obs), list(self.actions), list(self.terms)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -309,10 +310,6 @@ class Core:
         observe_batch(self.worlds, self.land, self.task, self._obs)
         return self.obs
 
-    def row(self, b: int) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-        """Views of the observation [n] and of the action [channels] of row b."""
-        return self._rows[b][:2]
-
     def scales(self) -> dict[str, float]:
         """What turns observations and actions into SI units: the scales of the task and facts of the vessel."""
         config = self.config
@@ -333,7 +330,7 @@ class Core:
         """The info dict of row b after a step."""
         outcome = OUTCOMES[self._outcome.item(b)]
         return {
-            "reward_terms": dict(zip(TERMS, self._rows[b][2].tolist(), strict=True)),
+            "reward_terms": named_terms(*self._row_terms[b].tolist()),
             "time": self._tick.item(b) * self._dt,
             "closest": self._closest.item(b),
             "to_go": self._to_go.item(b),

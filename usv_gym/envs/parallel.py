@@ -23,9 +23,9 @@ from ..tasks.share import ALONE, NO_CONTROL
 from ..tasks.step import BEGIN, STEP, run_batch
 from ..tasks.task import (
     OUTCOMES,
-    TERMS,
     action_space,
     episode_dtype,
+    named_terms,
     observation_size,
     observation_space,
     resolve_action,
@@ -270,7 +270,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         episode = self._episodes[0, k]
         outcome = OUTCOMES[episode["outcome"]]
         return {
-            "reward_terms": dict(zip(TERMS, episode["terms"].tolist(), strict=True)),
+            "reward_terms": named_terms(*episode["terms"].tolist()),
             "closest": float(episode["closest"]),
             "outcome": outcome,
             "is_success": outcome == "arrival",

@@ -140,7 +140,7 @@ class USVEnv(gym.Env[Any, Any]):
         self._window: Any = None
 
     def _observation(self) -> Any:
-        flat = self.core.row(0)[0]
+        flat = self.core.row_obs[0]
         return flat.copy() if self._flat else unflatten(self.core.config, flat)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -171,7 +171,7 @@ class USVEnv(gym.Env[Any, Any]):
         try:
             fits = getattr(action, "shape", None) == self._action_shape or np.shape(action) == self._action_shape
             if fits:
-                core.row(0)[1][:] = action
+                core.row_actions[0][:] = action
         except (ValueError, TypeError):
             fits = False
         if not fits:

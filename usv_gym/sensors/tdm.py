@@ -20,11 +20,9 @@ from ..world.state import (
     AIS_ATON,
     DESCRIPTOR_FIXED,
     DESCRIPTOR_VESSEL,
-    LIDAR,
     PHASE_MOTION,
     PHASE_NONE,
     PHASE_POSITION,
-    RADAR,
 )
 from . import light
 from .ais import ais_class, reporting_interval_us
@@ -35,11 +33,8 @@ from .tracker import MOVING, predicted, track_ais, track_scan
 
 
 @inner
-def _timeout_us(w, o, s, sensor):
-    if sensor == RADAR:
-        return w.sensors.radar.timeout_us
-    if sensor == LIDAR:
-        return w.sensors.lidar.timeout_us
+def _ais_timeout_us(w, o, s):
+    """How long after the message in the inbox a source is taken to be silent."""
     # as slow as the station may be, given the error of its SOG: a moored one reports seldom, and not always 0
     slowest = w.ais.inbox[o, s, 4] - 3.0 * hypot(w.sensors.ais_noise[4], w.sensors.ais_bias[4])
     interval = reporting_interval_us(ais_class(w, s), max(slowest, 0.0), 0.0, w.sensors.ais_interval_us)
@@ -50,10 +45,11 @@ def _timeout_us(w, o, s, sensor):
 def _drop_silent(w, o, s, now_us):
     """Forget the filters of sensors that timed out; returns True if any sensor still holds the target."""
     t = w.tracks
+    scans = w.sensors.radar.timeout_us, w.sensors.lidar.timeout_us
     alive = False
     for k in range(3):
         if t.phase[o, s, k] != PHASE_NONE:
-            if now_us - t.stamp_us[o, s, k] > _timeout_us(w, o, s, k):
+            if now_us - t.stamp_us[o, s, k] > (t.ais_timeout_us[o, s] if k == AIS else scans[k - 1]):
                 t.phase[o, s, k] = PHASE_NONE
             else:
                 alive = True
@@ -120,7 +116,8 @@ def take_ais(w, o, sender):
     a.inbox_stamp_us[o, s] = stamp
     phase = t.phase[o, s, AIS]
     elapsed = stamp - t.stamp_us[o, s, AIS]
-    if phase != PHASE_NONE and elapsed > _timeout_us(w, o, s, AIS):
+    t.ais_timeout_us[o, s] = timeout = _ais_timeout_us(w, o, s)
+    if phase != PHASE_NONE and elapsed > timeout:
         phase = PHASE_NONE
     t.phase[o, s, AIS] = track_ais(
         t.x_ais[o, s], t.p_ais[o, s], phase, elapsed * 1.0e-6, box[0], box[1], box[2], box[4], box[5], w.sensors

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -51,6 +51,10 @@ N_OWN, N_TARGET = len(OWN_FEATURES), len(TARGET_FEATURES)
 TERMS = ("progress", "cross_track", "proximity", "effort", "time", "collision", "arrival", "out_of_area", "grounding",
          "risk", "colregs")  # fmt: skip
 N_TERMS = len(TERMS)
+#: the terms, given in this order, by name: {"progress": progress, ..}; so written a dict takes half the time, in every step
+named_terms: Callable[..., dict[str, float]] = eval(
+    f"lambda {', '.join(TERMS)}: {{{', '.join(f'{term!r}: {term}' for term in TERMS)}}}"
+)
 
 #: effects of the actions of ``discrete``: change of heading [deg], of speed [share of max speed]
 DISCRETE = ((0.0, 0.0), (-15.0, 0.0), (15.0, 0.0), (0.0, 0.125), (0.0, -0.125))

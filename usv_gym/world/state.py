@@ -351,6 +351,7 @@ def _tracks(O: int, S: int) -> Dtype:
         ("stamp_us", i8, (O, S, 3)),  # time of validity of each local filter
         ("phase", i1, (O, S, 3)),
         ("id", i4, (O, S)),  # stable target id, 0: no target
+        ("ais_timeout_us", f8, (O, S)),  # after the last message
         ("x_ais", f8, (O, S, NX_AIS)), ("p_ais", f8, (O, S, NP_AIS)),
         ("x_scan", f8, (O, 2, S, NX_SCAN)), ("p_scan", f8, (O, 2, S, NP_SCAN)),
         ("size", f8, (O, 2, S, 2)), ("p_size", f8, (O, 2, S, 3)),  # apparent radius and its bias
