@@ -17,7 +17,9 @@ from synthetic import ANCHORED, BUOY, DRIFTING, DT, ICEBERG, METRES, ORIGIN, adv
 from usv_gym.replay import archive
 from usv_gym.replay.archive import AIS_REPORT, DETECTION, ArchiveError, Episode, load, sample_dtype, save
 from usv_gym.replay.recorder import Recorder
+from usv_gym.scenarios.loader import load_scenario
 from usv_gym.units import DEG, KNOT
+from usv_gym.voyage import Mission, Voyage
 from usv_gym.world import state
 
 
@@ -162,6 +164,15 @@ def test_thrusters_of_the_own_ship():
     recorder = Recorder()
     recorder.sample(w)
     assert np.isnan(recorder.finish().command).all()
+
+
+def test_the_last_command_of_a_tick_is_kept():
+    """A log with two rows of commands in every tick."""
+    rows = np.random.default_rng(1).uniform(-0.5, 1.0, (12, 2, state.A, 3))
+    voyage = Voyage(Mission(load_scenario("calm_crossing"), "log", rows=rows))
+    while not voyage.outcome:
+        voyage.step()
+    np.testing.assert_array_equal(voyage.recorder.finish().command[1:], rows[:, -1])
 
 
 def test_one_recorder_records_one_episode():

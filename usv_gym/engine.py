@@ -83,7 +83,7 @@ def attend(lanes, l, w, land, tracks):
     else:
         for p in range(lanes.shape[0]):
             if sails(lanes, p):
-                scatter_motion(lanes[p], l, w)
+                scatter_motion(lanes[p], l, w, p)
     tick = w.tick
     if tick - w.frame_tick >= w.frame_ticks:
         end_frame(w, land, tracks)

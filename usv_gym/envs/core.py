@@ -303,7 +303,7 @@ class Core:
         arguments = (self.worlds, self._lanes, self.land, self.tracks, self.task, self._episodes, self._obs, rows)
         if self.crew.size == 1 or rows is not NO_ROWS or np.count_nonzero(self._what) < _WORTH_SHARING:
             return int(run_batch(NO_CONTROL, ALONE, *arguments))
-        return int(self.crew.run(run_batch, *arguments))
+        return self.crew.run(run_batch, *arguments)
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""

@@ -20,6 +20,9 @@ def first_events(w):
         if w.sensors.exteroceptive:
             schedule(w, s, w.tick)
     w.ais_send = w.ais_due = 0
+    w.radar_next = next_fire(w.tick, w.dt_us, w.sensors.radar.period_us)
+    w.lidar_next = next_fire(w.tick, w.dt_us, w.sensors.lidar.period_us)
+    w.report_next = next_fire(w.tick, w.dt_us, w.sensors.tdm_period_us)
     _set_next(w, w.tick)
 
 
@@ -52,18 +55,11 @@ def _set_next(w, tick):
                 if w.tracks.scan_due[o, k] > tick:
                     soonest = min(soonest, w.tracks.scan_due[o, k])
         if p.radar.on:
-            soonest = min(soonest, next_fire(tick, w.dt_us, p.radar.period_us))
+            soonest = min(soonest, w.radar_next)
         if p.lidar.on:
-            soonest = min(soonest, next_fire(tick, w.dt_us, p.lidar.period_us))
-        soonest = min(soonest, next_fire(tick, w.dt_us, p.tdm_period_us))
+            soonest = min(soonest, w.lidar_next)
+        soonest = min(soonest, w.report_next)
     w.next_sense = soonest
-
-
-@inner
-def _due(tick, dt_us, period_us):
-    if period_us <= dt_us:
-        return period_us > 0
-    return (tick * dt_us) // period_us > ((tick - 1) * dt_us) // period_us
 
 
 @inner
@@ -85,9 +81,13 @@ def sense(w, land, tick):
     """
     p = w.sensors
     S = w.ais.next_tick.shape[0]
-    radar = p.radar.on and _due(tick, w.dt_us, p.radar.period_us)
-    lidar = p.lidar.on and _due(tick, w.dt_us, p.lidar.period_us)
-    report = _due(tick, w.dt_us, p.tdm_period_us)
+    radar, lidar, report = p.radar.on and tick >= w.radar_next, p.lidar.on and tick >= w.lidar_next, tick >= w.report_next
+    if radar:
+        w.radar_next = next_fire(tick, w.dt_us, p.radar.period_us)
+    if lidar:
+        w.lidar_next = next_fire(tick, w.dt_us, p.lidar.period_us)
+    if report:
+        w.report_next = next_fire(tick, w.dt_us, p.tdm_period_us)
     sends, receives = tick >= w.ais_send, w.ais_due != NEVER
     if radar or moves_observers(w) or (lidar and not lidars_know(w, tick)):
         move_traffic(w, tick)
@@ -99,15 +99,19 @@ def sense(w, land, tick):
                         if w.traffic_tick != tick:
                             place(w, s, tick)
                         transmit(w, s, tick)
+                        for o in range(w.observer.shape[0]):
+                            if w.ais.due_tick[o, s] == tick:  # without latency
+                                w.ais.due_tick[o, s] = -1
+                                take_ais(w, o, s)
                     else:  # it has left the sea, or its station is off
                         w.ais.next_tick[s] = NEVER
         for o in range(w.observer.shape[0]):
             if w.vessels.active[w.observer[o]] == 0:
                 continue
-            if (receives and (sends or tick >= w.ais_due)) or (sends and not make_room):
+            if make_room and receives and (sends or tick >= w.ais_due):
                 for s in range(S):
                     due = w.ais.due_tick[o, s]
-                    if due >= 0 and (due <= tick or (make_room and tick >= w.ais.next_tick[s])):
+                    if due >= 0 and (due <= tick or tick >= w.ais.next_tick[s]):
                         w.ais.due_tick[o, s] = -1
                         take_ais(w, o, s)
             if not make_room:

@@ -174,14 +174,15 @@ def gather_command(g, l, w, p):
 
 
 @inner
-def scatter_motion(g, l, w):
-    """Write position, motion and what the weather is now from lane l into its world."""
+def scatter_motion(g, l, w, p):
+    """Write position and motion from lane l into its world, whose plant p it is; with plant 0 also the tick and the weather."""
     weather, v, j = w.weather, w.vessels, g.slot[l]
-    w.tick = g.tick[l]
-    weather.wind_u10 = g.wind_u10[l]
-    weather.wind_direction = g.wind_direction[l]
-    weather.current[0] = g.current[0, l]
-    weather.current[1] = g.current[1, l]
+    if p == 0:
+        w.tick = g.tick[l]
+        weather.wind_u10 = g.wind_u10[l]
+        weather.wind_direction = g.wind_direction[l]
+        weather.current[0] = g.current[0, l]
+        weather.current[1] = g.current[1, l]
     if j >= 0:
         for k in range(3):
             v.eta[j, k] = g.eta[k, l]
@@ -194,8 +195,9 @@ def scatter_motion(g, l, w):
 def scatter(g, l, w, p):
     """Write all that has changed in lane l into its world, whose plant p it is."""
     weather, q = w.weather, w.plants
-    scatter_motion(g, l, w)
-    _write_processes(g, l, weather)
+    scatter_motion(g, l, w, p)
+    if p == 0:
+        _write_processes(g, l, weather)
     j = g.slot[l]
     if j < 0:
         return
@@ -206,6 +208,9 @@ def scatter(g, l, w, p):
         q.tau_wave[p, k] = g.tau_wave[k, l]
         q.wave_x[p, k, 0] = g.wave_x[k, 0, l]
         q.wave_x[p, k, 1] = g.wave_x[k, 1, l]
+    for i in range(A):
+        for c in range(3):
+            q.command[p, i, c] = g.command[i, c, l]
     for i in range(q.thrusters[p]):
         q.n[p, i] = g.n[i, l]
         q.alpha[p, i] = g.alpha[i, l]

@@ -406,6 +406,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("frame_ticks", i8), ("frame_tick", i8),  # ticks per traffic frame; tick at which the current frame began
         ("traffic_tick", i8),  # tick to which positions of traffic refer
         ("ais_send", i8), ("ais_due", i8),  # first tick at which any AIS message is sent, arrives
+        ("radar_next", i8), ("lidar_next", i8), ("report_next", i8),  # ticks of the next scans and of the TDM's next report
         ("next_sense", i8), ("next_nav", i8),  # first tick at which any exteroceptive sensor, any navigation sensor fires
         ("look_tick", i8),  # before which nobody reads the own navigation, but for the position (sensors/nav.py)
         ("seed", u8),
