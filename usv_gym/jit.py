@@ -90,7 +90,7 @@ def _source_hash() -> str:
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
     for path in sorted(package.rglob("*.py")):
         text = path.read_bytes()
-        if b"jit import" in text or path.name in ("jit.py", "state.py"):
+        if b"jit import" in text or path.name in ("jit.py", "atomic.py", "state.py"):
             digest.update(path.relative_to(package).as_posix().encode())
             digest.update(text)
     return digest.hexdigest()[:16]
