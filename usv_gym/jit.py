@@ -69,6 +69,18 @@ def lean_kernel(function: F) -> F:
     return _cached(function, {"_nrt": False})
 
 
+def bound(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+    """``function(*arguments)`` of a kernel as a call without arguments, for the same arrays again and again.
+
+    To find out what ten arrays are takes numba longer than a tenth of a control step.  Compiles if need be; runs nothing.
+    """
+    if not hasattr(function, "overloads"):  # NUMBA_DISABLE_JIT
+        return functools.partial(function, *arguments)
+    types = tuple(function.typeof_pyval(argument) for argument in arguments)  # type: ignore[attr-defined]
+    function.compile(types)  # type: ignore[attr-defined]
+    return functools.partial(function.overloads[types].entry_point, *arguments)
+
+
 def _cached(function: F, flags: dict[str, Any]) -> F:
     previous = numba.config.CACHE_DIR  # type: ignore[attr-defined]
     numba.config.CACHE_DIR = str(cache_directory())  # type: ignore[attr-defined]

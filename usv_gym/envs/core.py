@@ -6,7 +6,7 @@ Row b of any batch equals a batch of one with the same seed, bit for bit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import ConfigError, Document, validate
+from ..jit import bound
 from ..scenarios.build import build_worlds, track_pool, write_weather
 from ..scenarios.families import FAMILIES
 from ..scenarios.families.failures import sample_failures
@@ -29,6 +30,7 @@ from ..tasks.task import (
     Vessel,
     action_space,
     episode_dtype,
+    floats_dtype,
     named_terms,
     observation_size,
     observation_space,
@@ -133,10 +135,15 @@ class Core:
         self.terminated, self.truncated = self.episodes["terminated"], self.episodes["truncated"]
         self._what, self._outcome = self.episodes["what"], self.episodes["outcome"]
         self._closest, self._to_go = self.episodes["closest"], self.episodes["to_go"]
+        self._stepping = False  # ``what`` is STEP in all rows
         self._no_texts = np.full(self.num, OUTCOMES[0], object)
         self._tick = self.worlds["tick"]
         # by row, for the single environment: making a view costs as much as half a kernel call
-        self.row_obs, self.row_actions, self._row_terms = list(self.obs), list(self.actions), list(self.terms)
+        self.row_obs, self.row_actions = list(self.obs), list(self.actions)
+        self._row_floats = list(self.episodes.view(floats_dtype())["floats"])
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_alone": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -182,6 +189,7 @@ class Core:
         self.coasts, self.land = coasts, land_pool(coasts)
         self.tracks = track_pool(scenario)
         self._lanes = lanes_for(worlds)
+        self._alone: Callable[[], int] | None = None  # one thread's work, bound to the arrays of now
         self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation
         self.control_interval = simulation.control_ticks * simulation.dt
@@ -243,6 +251,7 @@ class Core:
         """Draw and start new episodes in the rows of ``mask`` [B]; generators [B] own the randomness."""
         self.draw(mask, generators)
         self._what[:] = np.where(mask, BEGIN, 0)
+        self._stepping = False
         self._run(NO_ROWS)
 
     def draw(self, mask: NDArray[np.bool_], generators: Sequence[np.random.Generator]) -> None:
@@ -290,8 +299,11 @@ class Core:
             if an action is not finite, or none of ``discrete``; nothing has moved then.
         """
         if mask is None:
-            self._what.fill(STEP)
+            if not self._stepping:
+                self._what.fill(STEP)
+                self._stepping = True
         else:
+            self._stepping = False
             np.multiply(mask, STEP, out=self._what, casting="unsafe")
         bad = self._run(rows)
         if bad >= 0:
@@ -300,10 +312,17 @@ class Core:
             raise ValueError(f"action {self.actions[bad].tolist()}{row}: expected {expected}")
 
     def _run(self, rows: NDArray[np.float64]) -> int:
-        arguments = (self.worlds, self._lanes, self.land, self.tracks, self.task, self._episodes, self._obs, rows)
-        if self.crew.size == 1 or rows is not NO_ROWS or np.count_nonzero(self._what) < _WORTH_SHARING:
-            return int(run_batch(NO_CONTROL, ALONE, *arguments))
-        return self.crew.run(run_batch, *arguments)
+        alone = self.crew.size == 1 or np.count_nonzero(self._what) < _WORTH_SHARING
+        if alone and rows is NO_ROWS:
+            if self._alone is None:
+                self._alone = bound(run_batch, NO_CONTROL, ALONE, *self._arguments(rows))
+            return self._alone()
+        if alone or rows is not NO_ROWS:
+            return int(run_batch(NO_CONTROL, ALONE, *self._arguments(rows)))
+        return self.crew.run(run_batch, *self._arguments(rows))
+
+    def _arguments(self, rows: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
+        return self.worlds, self._lanes, self.land, self.tracks, self.task, self._episodes, self._obs, rows
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""
@@ -329,11 +348,12 @@ class Core:
     def info(self, b: int) -> dict[str, Any]:
         """The info dict of row b after a step."""
         outcome = OUTCOMES[self._outcome.item(b)]
+        closest, to_go, *terms = self._row_floats[b].tolist()
         return {
-            "reward_terms": named_terms(*self._row_terms[b].tolist()),
+            "reward_terms": named_terms(*terms),
             "time": self._tick.item(b) * self._dt,
-            "closest": self._closest.item(b),
-            "to_go": self._to_go.item(b),
+            "closest": closest,
+            "to_go": to_go,
             "outcome": outcome,
             "is_success": outcome == "arrival",
         }

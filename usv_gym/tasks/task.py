@@ -149,14 +149,24 @@ def episode_dtype() -> np.dtype[Any]:
     """dtype of what passes between face and kernel, and of what a task remembers of an episode: one per observer."""
     return np.dtype([
         ("what", "i1"), ("action", "f8", (3 * A,)),  # in: tasks/step.py, BEGIN or STEP; channels of the action
-        ("reward", "f8"), ("terms", "f8", (N_TERMS,)), ("terminated", "?"), ("truncated", "?"),  # out
-        ("step", "i8"), ("to_go", "f8"),  # steps so far; distance to go along the route [m]
+        ("reward", "f8"),  # out
+        # smallest hull distance to anything since reset [m]; distance to go along the route [m]; floats_dtype() sees all as one
+        ("closest", "f8"), ("to_go", "f8"), ("terms", "f8", (N_TERMS,)),
+        ("terminated", "?"), ("truncated", "?"), ("step", "i8"),  # steps so far
         ("heading_ref", "f8"), ("speed_ref", "f8"),  # of heading_speed and discrete
         ("last_action", "f8", (3 * A,)), ("change", "f8"),  # mean squared change of the action in this step
         ("collided", "i1"), ("grounded", "i1"), ("arrived", "i1"),  # before this step
-        ("closest", "f8"),  # smallest hull distance to anything since reset [m]
         ("outcome", "i1"),  # 0 running, 1 collision, 2 arrival, 3 out of area, 4 time limit, 5 grounding
     ], align=True)  # fmt: skip
+
+
+@functools.cache
+def floats_dtype() -> np.dtype[Any]:
+    """Overlay of ``episode_dtype``: ``closest``, ``to_go`` and ``terms`` as one row ``floats``, which is read at once."""
+    whole = episode_dtype()
+    assert whole.fields is not None
+    return np.dtype({"names": ["floats"], "formats": [("f8", (2 + N_TERMS,))], "offsets": [whole.fields["closest"][1]],
+                     "itemsize": whole.itemsize})  # fmt: skip
 
 
 OUTCOMES = ("running", "collision", "arrival", "out_of_area", "time_limit", "grounding")
