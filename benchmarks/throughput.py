@@ -1,7 +1,7 @@
 """Steps per second of everything, and what starting costs.  ``python benchmarks/throughput.py [--quick]``
 
 Prints a table, writes benchmarks/results/throughput.json and draws docs/images/throughput.png.  How to read it:
-benchmarks/README.md.  About eight minutes on a quiet machine, two of them compiling; ``--quick`` takes two and draws nothing.
+benchmarks/README.md.  About nine minutes on a quiet machine, two of them compiling; ``--quick`` takes two and draws nothing.
 """
 
 from __future__ import annotations

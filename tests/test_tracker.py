@@ -519,6 +519,14 @@ def test_copies_leave_the_filter_alone():
     assert list(Q[:4]) == [P[0], 0.0, P[0], 0.0]
 
 
+def test_no_time_leaves_a_bias_as_it_is():
+    """Also where it is the first that a scan is asked for."""
+    scan = sensors()[()]["radar"]
+    for h, share in ((0.0, 1.0), (2.5, math.exp(-0.25)), (0.0, 1.0)):
+        ekf.decays(scan, h)
+        assert scan["decay"][0] == pytest.approx(share, rel=1e-15)
+
+
 def test_sensors_without_noise():
     s = sensors()
     for name in ("radar", "lidar"):

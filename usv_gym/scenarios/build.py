@@ -258,7 +258,7 @@ def write_agent(
 def carry_on_from_here(w: Any, source: int) -> None:
     """After a source was put somewhere within a traffic frame: let the frame begin where it would have come from.
 
-    Traffic is carried from where it was as the frame began (traffic/ships.py).
+    Traffic is carried from where it was as the frame began (world/carry.py).
     """
     v, m = w["vessels"], w["obstacles"]
     w["tracks"]["slack"] = 0.0  # the LiDAR has to look for it

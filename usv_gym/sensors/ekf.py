@@ -43,7 +43,7 @@ MEMORY = 60.0
 @inner
 def decays(scan, h):
     """Work out what ``scan`` keeps of a time of h [s] between two fixes: nearly all targets of a scan ask for the same one."""
-    if scan.elapsed != h:
+    if scan.elapsed != h or scan.fade == 0.0:  # 0: nobody has asked yet
         scan.elapsed = h
         for i in range(2):
             scan.decay[i] = exp(-h / scan.bias_time[i]) if h > 0.0 else 1.0

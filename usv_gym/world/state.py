@@ -431,7 +431,7 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         ("steer_how", i1, (V,)), ("steer_north", f8, (V,)), ("steer_east", f8, (V,)), ("steer_heading", f8, (V,)),
         ("steer_speed", f8, (V,)), ("steered_rate", f8, (V,)), ("steered_velocity", f8, (2, V)),
         # work space of the shadow test (sensors/shadow.py)
-        ("slots", i8, (S,)), ("look", f8, (10, S)),  # rows that are vector code's, also of scans and transmissions
+        ("slots", i8, (S,)), ("look", f8, (10, S)),  # rows that are vector code's, also of scans
         ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("widths", f8, (S,)),  # [m], [rad], [rad], [m]
         ("order", i4, (S,)), ("seen", i4, (S,)), ("hidden", i1, (S,)),
         ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)),
