@@ -333,4 +333,4 @@ def _end_spoof(w, s, source):
     a.spoof_mmsi[s] = 0
     for o in range(w.observer.shape[0]):
         a.inbox_stamp_us[o, source] = -1
-        w.tracks.phase[o, source, AIS] = PHASE_NONE
+        w.tracks.phase[o, AIS, source] = PHASE_NONE

@@ -28,13 +28,13 @@ def false_alarms(w, o, k, sensor, reach, rate, tick, stream):
     for i in range(count):
         s = w.vessels.active.shape[0] + last - i
         slot = 4 * (16 * o + i)
-        held = t.phase[o, s, k + 1] != PHASE_NONE
+        held = t.phase[o, k + 1, s] != PHASE_NONE
         if not held and t.id[o, s] != 0:
             continue  # the TDM has yet to drop the one before
         chance = RETURNS if held else min(rate / count, 1.0)
         if rng.uniform(w.seed, stream, slot, tick) >= chance:
             continue
-        measured = t.measured[o, k, s]
+        measured = t.filters[o, k + 1].measured[:, s]
         if held:
             if now - t.measured_us[o, k, s] > sensor.timeout_us:
                 continue  # timed out; the TDM will notice

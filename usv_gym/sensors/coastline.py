@@ -23,6 +23,7 @@ from ..world.shore import (
     sector_of,
 )
 from ..world.state import DESCRIPTOR_LAND, LIDAR, RADAR, L, T
+from .shadow import BEARING, HALF, RANGE
 
 CHART_REACH = 1852.0  #: [m] how far around the own ship the chart is read
 CHART_STEP = 10.0  #: [m] from where it was read last, it is read again
@@ -34,34 +35,33 @@ GAP_RATIO, GAP = 3.0, 50.0
 
 @inner
 def hide_behind_land(w, land, own, count):
-    """Set ``w.hidden`` of sources that look_around() found and that land hides: the centre, and both ends of its width."""
+    """Set ``w.hidden`` of sources of a look that land hides: the centre, and both ends of its width."""
     h = coast(land, w.land_id)
     if h == 0:
         return
     n, e = w.vessels.eta[own, 0], w.vessels.eta[own, 1]
     free = clearance(land, h, n, e)
     for i in range(count):
-        s = w.order[i]
-        d = w.ranges[s]
-        if w.hidden[s] or d <= free:
+        d = w.look[RANGE, i]
+        if w.hidden[i] or d <= free:
             continue
+        bearing, half = w.look[BEARING, i], w.look[HALF, i]
         blocked = True
         for side in range(3):
             if blocked:
-                rs, rc = sincos(w.bearings[s] + (0.0 if side == 0 else w.half_angles[s] if side == 1 else -w.half_angles[s]))
+                rs, rc = sincos(bearing + (0.0 if side == 0 else half if side == 1 else -half))
                 blocked = ray_range(land, h, n, e, rc, rs, d) < d
         if blocked:
-            w.hidden[s] = 1
+            w.hidden[i] = 1
 
 
 @inner
 def _covered(w, count, bearing, r):
     """True if a source nearer than r [m] stands in a bearing."""
     for i in range(count):
-        s = w.order[i]
-        if w.ranges[s] >= r:
+        if w.look[RANGE, i] >= r:
             return False
-        if abs(wrap(bearing - w.bearings[s])) <= w.half_angles[s]:
+        if abs(wrap(bearing - w.look[BEARING, i])) <= w.look[HALF, i]:
             return True
     return False
 
@@ -83,7 +83,7 @@ def _look_between(w, land, h, n, e, i, reach, count, echo):
 
 @spliced
 def echo_land(w, land, o, k, sensor, reach, tick, count, stream_noise, stream_detection):
-    """What a scan of radar (k = 0) or LiDAR (k = 1) of observer o gets back from land; the sources in range are known."""
+    """What a scan of radar (k = 0) or LiDAR (k = 1) of observer o gets back from land, between the ``count`` sources of the look."""
     h = coast(land, w.land_id)
     if h == 0:
         return
@@ -95,12 +95,12 @@ def echo_land(w, land, o, k, sensor, reach, tick, count, stream_noise, stream_de
     if not nearest_land(land, h, n, e, reach, echo):
         return
     for m in range(count):
-        s = w.order[m]
-        first, sectors = bearing_sectors(w.bearings[s], w.half_angles[s])
+        bearing, half = w.look[BEARING, m], w.look[HALF, m]
+        first, sectors = bearing_sectors(bearing, half)
         for step in range(sectors):
             i = (first + step) % L
             r = hypot(echo[i, 0], echo[i, 1])
-            if r > w.ranges[s] and abs(wrap(atan2(echo[i, 1], echo[i, 0]) - w.bearings[s])) <= w.half_angles[s]:
+            if r > w.look[RANGE, m] and abs(wrap(atan2(echo[i, 1], echo[i, 0]) - bearing)) <= half:
                 _look_between(w, land, h, n, e, i, reach, count, echo)
     detection = sensor.detection * w.weather.detection_factor
     spread = sensor.gain * hypot(sensor.noise[0], sensor.bias[0])

@@ -26,7 +26,7 @@ import math
 
 import numpy as np
 
-from ..jit import inner
+from ..jit import inner, scalar
 from ..trig import exp, wrap
 from .motion import column, correct, correct_row, predict_motion, start_motion
 
@@ -88,7 +88,7 @@ def _predict_bias(x, P, n, i, a, bias):
     P[k + i] += bias * bias * (1.0 - a * a)
 
 
-@inner
+@scalar
 def predict_position(x, P, a, bias):
     """Move a static filter: only its sensor biases (standard deviation [m]) change, of which the share a is left."""
     x[2] *= a
@@ -97,14 +97,12 @@ def predict_position(x, P, a, bias):
     P[2] = a * a * P[2] + bias * bias * (1.0 - a * a)
 
 
-@inner
-def predict_size(x, P, h, scan):
-    """Move a size filter by h [s]: the radius is constant, its bias is not."""
-    decays(scan, h)
-    a = scan.decay[1]
+@scalar
+def predict_size(x, P, a, bias):
+    """Move a size filter: the radius is constant, its bias (standard deviation [m]) is not, of which the share a is left."""
     x[1] *= a
     P[1] *= a
-    P[2] = a * a * P[2] + scan.bias[1] * scan.bias[1] * (1.0 - a * a)
+    P[2] = a * a * P[2] + bias * bias * (1.0 - a * a)
 
 
 @inner
@@ -113,7 +111,7 @@ def _field(i):
     return i if i < 3 else i + 1
 
 
-@inner
+@scalar
 def white(f, noise):
     """Variance of the white part of an error with factor f and standard deviation ``noise`` at f = 1."""
     return max(f * f * noise * noise, VARIANCE_MIN)
@@ -140,7 +138,7 @@ def update_ais(x, P, n, e, psi, u, r, sensors):
             _update_ais(x, P, i, wrap(innovation) if i == 2 else innovation, sensors.ais_noise[_field(i)])
 
 
-@inner
+@scalar
 def update_position(x, P, n, e, f, noise):
     """Fix n, e [m] into a static filter; noise is the white standard deviation [m] at f = 1."""
     gp = P[0] + f * P[1]
@@ -157,12 +155,12 @@ def update_position(x, P, n, e, f, noise):
     P[2] -= s * gb * gb
 
 
-@inner
-def update_size(x, P, radius, f, scan):
-    """Measured apparent radius [m] with error factor f."""
+@scalar
+def update_size(x, P, radius, f, noise):
+    """Measured apparent radius [m] with error factor f; noise is the white standard deviation [m] at f = 1."""
     g0 = P[0] + f * P[1]
     g1 = P[1] + f * P[2]
-    s = 1.0 / (g0 + f * g1 + white(f, scan.noise[1]))
+    s = 1.0 / (g0 + f * g1 + white(f, noise))
     d = s * (radius - x[0] - f * x[1])
     x[0] += g0 * d
     x[1] += g1 * d
@@ -221,7 +219,7 @@ def _update_ais(x, P, i, innovation, noise):
 
 
 # --- initialisation --------------------------------------------------------------------------------------------------
-@inner
+@scalar
 def init_position(x, P, n, e, variance, cross, bias):
     """Static filter at n, e [m]; per axis the variance [m2], its covariance with the bias, the bias's deviation [m]."""
     x[0] = n

@@ -7,22 +7,25 @@ numbers, [pp, pv, vv, pb, vb, bb].  Everything is linear; speed has no sign, so 
 AIS message become a velocity whose variance is the larger one of along and across; with the bias, which a filter without a
 state for it cannot follow, counted as white noise that lets means converge as slowly.  Yaw rate is not estimated.
 
-A target that does not move is averaged by the static filter of ``ekf``, and starts to move by the same test, as with the
-thesis's filters (``tracker``); these functions stand in for PHASE_MOTION only.  ``sensors``, ``scan`` and ``h``: see ``ekf``.
-docs/tracking.md compares the two.
+A target that does not move is averaged by the static filter of ``ekf``, and starts to move by the same test (``still``), as
+with the thesis's filters (``tracker``).  ``sensors``, ``scan`` and ``h``: see ``ekf``.  docs/tracking.md compares the two.
+
+Arrays are 1-D, or columns of the rows of all targets, for which ``predict``, ``update_position``, ``stopped``, ``predicted`` and
+``fuse`` become vector code (sensors/intake.py, sensors/tdm.py).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..jit import inner
+from ..jit import inner, scalar
 from ..trig import exp, sincos
-from ..world.state import PHASE_MOTION, PHASE_NONE
-from . import ekf
+from ..world.state import PHASE_MOTION, PHASE_NONE, PHASE_POSITION
+from . import ekf, still
+from .tracker import STOPPED, track_station
 
 
-@inner
+@scalar
 def predict(x, P, h, a, q, bias):
     """Move a filter by h [s], after which the share a of the bias is left.
 
@@ -43,7 +46,7 @@ def predict(x, P, h, a, q, bias):
     P[5] = a * a * P[5] + bias * bias * (1.0 - a * a)
 
 
-@inner
+@scalar
 def update_position(x, P, n, e, f, variance):
     """Fix n, e [m] with error factor f and this variance of its white part."""
     gp = P[0] + f * P[3]
@@ -62,7 +65,7 @@ def update_velocity(x, P, vn, ve, variance):
     _correct(x, P, s, P[1], P[2], P[4], s * (vn - x[2]), s * (ve - x[3]))
 
 
-@inner
+@scalar
 def _correct(x, P, s, gp, gv, gb, dn, de):
     x[0] += gp * dn
     x[1] += gp * de
@@ -113,104 +116,112 @@ def _variance(noise, bias, bias_time, h):
 
 
 @inner
-def track_ais(x, P, h, n, e, psi, u, sensors):
-    """Take an AIS message into a moving filter: position [m], COG [rad] and SOG [m/s], which may be NaN."""
-    predict(x, P, h, exp(-h / sensors.ais_bias_time[0]), sensors.light_q, sensors.ais_bias[0])
-    update_position(x, P, n, e, 1.0, ekf.white(1.0, sensors.ais_noise[0]))
-    if not (np.isnan(psi) or np.isnan(u)):
-        vn, ve, variance = ais_velocity(psi, u, h, sensors)
-        update_velocity(x, P, vn, ve, variance)
-
-
-@inner
-def init_ais(x, P, n, e, psi, u, sensors):
-    """Moving filter from the first AIS message."""
-    ekf.init_fix(x, P, n, e, 1.0, sensors.ais_noise[0], sensors.ais_bias[0])
-    vn, ve, variance = ais_velocity(psi, u, 0.0, sensors)
-    start(x, P, vn, ve, variance, 0.0)
-
-
-@inner
-def track_scan(x, P, h, n, e, f, sensors, scan):
-    """Take a fix n, e [m] with error factor f of radar or LiDAR into a moving filter."""
-    ekf.decays(scan, h)
-    predict(x, P, h, scan.decay[0], sensors.light_q, scan.bias[0])
-    update_position(x, P, n, e, f, ekf.white(f, scan.noise[0]))
-
-
-@inner
-def predicted(x, P, phase, h, sensors, X, Q):
-    """Copy [N, E, vN, vE] and [pp, pv, vv] of a filter into X and Q and move the copy by h [s]."""
+def track_ais(x, P, phase, h, n, e, psi, u, sensors):
+    """Take an AIS message: position [m], COG [rad] and SOG [m/s], which may be NaN.  Returns the new phase."""
     if phase == PHASE_MOTION:
-        X[2] = x[2]
-        X[3] = x[3]
-        X[0] = x[0] + h * x[2]
-        X[1] = x[1] + h * x[3]
-        q = sensors.light_q
-        pv = P[1] + h * P[2]
-        Q[0] = P[0] + h * (P[1] + pv) + q * h * h * h / 3.0
-        Q[1] = pv + 0.5 * q * h * h
-        Q[2] = P[2] + q * h
+        predict(x, P, h, exp(-h / sensors.ais_bias_time[0]), sensors.light_q, sensors.ais_bias[0])
+        update_position(x, P, n, e, 1.0, ekf.white(1.0, sensors.ais_noise[0]))
+        if not (np.isnan(psi) or np.isnan(u)):
+            vn, ve, variance = ais_velocity(psi, u, h, sensors)
+            update_velocity(x, P, vn, ve, variance)
+    elif not (np.isnan(psi) or np.isnan(u)):
+        ekf.init_fix(x, P, n, e, 1.0, sensors.ais_noise[0], sensors.ais_bias[0])
+        vn, ve, variance = ais_velocity(psi, u, 0.0, sensors)
+        start(x, P, vn, ve, variance, 0.0)
+        phase = PHASE_MOTION
     else:
-        X[0] = x[0]
-        X[1] = x[1]
-        X[2] = X[3] = 0.0
-        Q[0] = P[0]
-        Q[1] = Q[2] = 0.0
-
-
-@inner
-def fuse(x, P, phase, y, Q, other):
-    """Fuse estimate y, Q of phase ``other`` into x, P of phase ``phase``, as ``predicted`` gives them; returns the phase.
-
-    Simple Fusion (see ``fusion``): a Kalman update with S = P + Q, a 2 x 2 matrix for both axes.
-    """
-    if other == PHASE_NONE:
-        return phase
-    if phase == PHASE_NONE:
-        _copy(x, P, y, Q)
-        return other
-    if phase == PHASE_MOTION and other == PHASE_MOTION:
-        pp, pv, vv = P[0], P[1], P[2]
-        a, b, c = pp + Q[0], pv + Q[1], vv + Q[2]
-        g = 1.0 / (a * c - b * b)
-        # K = P S^-1
-        k00, k01 = (pp * c - pv * b) * g, (pv * a - pp * b) * g
-        k10, k11 = (pv * c - vv * b) * g, (vv * a - pv * b) * g
-        for i in range(2):
-            dp, dv = y[i] - x[i], y[2 + i] - x[2 + i]
-            x[i] += k00 * dp + k01 * dv
-            x[2 + i] += k10 * dp + k11 * dv
-        P[0] = pp - k00 * pp - k01 * pv
-        P[1] = pv - k00 * pv - k01 * vv
-        P[2] = vv - k10 * pv - k11 * vv
-        return phase
-    n, e, variance = y[0], y[1], Q[0]
-    if other == PHASE_MOTION:
-        n, e, variance = x[0], x[1], P[0]
-        _copy(x, P, y, Q)
-        phase = other
-    s = 1.0 / (P[0] + variance)
-    gp, gv = P[0], P[1]
-    for i in range(2):
-        d = s * ((n if i == 0 else e) - x[i])
-        x[i] += gp * d
-        x[2 + i] += gv * d
-    P[0] -= s * gp * gp
-    P[1] -= s * gp * gv
-    P[2] -= s * gv * gv
+        phase = track_station(x, P, phase, h, n, e, sensors)
     return phase
 
 
 @inner
-def _copy(x, P, y, Q):
-    for i in range(4):
-        x[i] = y[i]
-    for i in range(3):
-        P[i] = Q[i]
+def track_scan(x, P, line, phase, h, n, e, f, sensors, scan):
+    """Take a fix n, e [m] with error factor f of radar or LiDAR.  Returns the new phase."""
+    ekf.decays(scan, h)
+    if phase == PHASE_MOTION:
+        predict(x, P, h, scan.decay[0], sensors.light_q, scan.bias[0])
+        update_position(x, P, n, e, f, ekf.white(f, scan.noise[0]))
+        if stopped(x, P):
+            phase = stop(x, P, line, n, e, f, scan)
+    elif phase == PHASE_POSITION:
+        if still.average(x, P, line, h, n, e, f, scan.noise[0], scan.bias[0], scan.decay[0], scan.fade, scan.slowness) != 0.0:
+            phase = set_off(x, P, line)
+    else:
+        still.first_fix(x, P, line, n, e, f, scan)
+        phase = PHASE_POSITION
+    return phase
+
+
+@scalar
+def stopped(x, P):
+    """True if the speed is nothing that can be told from 0."""
+    return speed2(x) < STOPPED * STOPPED * P[2]
 
 
 @inner
+def stop(x, P, line, n, e, f, scan):
+    """Make the filter that of a target which does not move, after a fix n, e [m]; returns its phase."""
+    ekf.init_position(x, P, x[0], x[1], P[0], 0.0, scan.bias[0])
+    still.start_line(line, n, e, f, scan)
+    return PHASE_POSITION
+
+
+@inner
+def set_off(x, P, line):
+    """Make the static filter one of the motion that its line shows; returns its phase."""
+    vn, ve, variance, age = still.velocity(line)
+    start(x, P, vn, ve, variance, age)
+    return PHASE_MOTION
+
+
+@scalar
+def predicted(x, P, phase, h, q):
+    """[N, E, vN, vE] and [pp, pv, vv] of a filter, moved by h [s]; q as in ``predict``.  Of no account in PHASE_NONE."""
+    moving = phase == PHASE_MOTION
+    t = h if moving else 0.0
+    vn, ve = x[2] if moving else 0.0, x[3] if moving else 0.0
+    vv = P[2] if moving else 0.0
+    pv = (P[1] if moving else 0.0) + t * vv
+    pp = P[0] + t * ((P[1] if moving else 0.0) + pv) + q * t * t * t / 3.0
+    return x[0] + t * vn, x[1] + t * ve, vn, ve, pp, pv + 0.5 * q * t * t, vv + q * t
+
+
+@scalar
+def fuse(x, P, phase, y, Q, other):
+    """Fuse estimate y, Q of phase ``other`` into x, P of phase ``phase``, as ``predicted`` gives them; returns the phase.
+
+    Simple Fusion (see ``fusion``): a Kalman update with S = P + Q, a 2 x 2 matrix for both axes.  An estimate that does not
+    move says nothing of the velocity.
+    """
+    moves, joins = phase == PHASE_MOTION, other == PHASE_MOTION
+    # the one that moves, if one does, is corrected by the other
+    swap = joins & (not moves)
+    n, e, vn, ve = y[0] if swap else x[0], y[1] if swap else x[1], y[2] if swap else x[2], y[3] if swap else x[3]
+    pp, pv, vv = Q[0] if swap else P[0], Q[1] if swap else P[1], Q[2] if swap else P[2]
+    dn, de = (x[0] if swap else y[0]) - n, (x[1] if swap else y[1]) - e
+    a = pp + (P[0] if swap else Q[0])
+    s = 1.0 / a
+    k0, l0, k1, l1 = pp * s, 0.0, pv * s, 0.0  # K = P S^-1, rows of position and velocity
+    dvn = dve = 0.0
+    if moves & joins:
+        b, c = pv + Q[1], vv + Q[2]
+        s = 1.0 / (a * c - b * b)
+        k0, l0 = (pp * c - pv * b) * s, (pv * a - pp * b) * s
+        k1, l1 = (pv * c - vv * b) * s, (vv * a - pv * b) * s
+        dvn, dve = y[2] - vn, y[3] - ve
+    if other != PHASE_NONE:
+        first = phase == PHASE_NONE
+        x[0] = y[0] if first else n + k0 * dn + l0 * dvn
+        x[1] = y[1] if first else e + k0 * de + l0 * dve
+        x[2] = y[2] if first else vn + k1 * dn + l1 * dvn
+        x[3] = y[3] if first else ve + k1 * de + l1 * dve
+        P[0] = Q[0] if first else pp - k0 * pp - l0 * pv
+        P[1] = Q[1] if first else pv - k0 * pv - l0 * vv
+        P[2] = Q[2] if first else vv - k1 * pv - l1 * vv
+    return max(phase, other)
+
+
+@scalar
 def speed2(x):
     """Squared speed [m2/s2]."""
     return x[2] * x[2] + x[3] * x[3]

@@ -17,10 +17,13 @@ from ..world.carry import place
 from ..world.state import LIDAR, MODEL_3DOF, RADAR
 from .clutter import false_alarms
 from .coastline import deliver_land, echo_land, hide_behind_land
+from .intake import take_scan
 from .noise import pair_slot
-from .shadow import cast_shadows, look_around, look_at
-from .tdm import take_scan
+from .shadow import BEAM, BEARING, DE, DN, HEADING, HIGH, LENGTH, LOW, RADIUS, RANGE, WIDTH, cast_shadows, look_around, look_at
 
+#: rows of ``w.look`` that a scan puts in the place of what the shadows are done with: decay and kick of the bias of position
+#: and of radius, the three biases, 1 for what is detected
+_A0, _G0, _A1, _G1, _BIAS, _FOUND = HEADING, BEAM, LENGTH, LOW, BEARING, HIGH
 _SURE = 0.01  #: [m] more than rounding can make
 
 
@@ -34,12 +37,7 @@ def deliver(w, o, k, tick):
     deliver_land(w, o, k)
     if t.scan_found[o, k] == 0:
         return
-    for s in range(t.id.shape[1]):
-        if t.measured_us[o, k, s] == t.scan_us[o, k]:
-            if k == RADAR - 1:
-                take_scan(w, o, k, s, w.sensors.radar)
-            else:
-                take_scan(w, o, k, s, w.sensors.lidar)
+    take_scan(w, o, k + 1, w.sensors.radar if k == RADAR - 1 else w.sensors.lidar)
 
 
 @inner
@@ -104,85 +102,87 @@ def _remember(w, o, own, reach, tick):
 @inner
 def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_detection,
           stream_land, clutter, stream_clutter):
-    t = w.tracks
+    t, g, look = w.tracks, w.tracks.filters[o, k + 1], w.look
     own = w.observer[o]
-    S = t.id.shape[1]
-    for s in range(S):
+    for s in range(t.id.shape[1]):
         t.visible[o, k, s] = 0
     if sensor.outage:
         return
     t.scan_found[o, k] = 0
     if w.traffic_tick == tick:
-        count = look_around(w, own, reach)
+        count = look_around(w, o, reach)
         if k == LIDAR - 1:
             _remember(w, o, own, reach, tick)
     else:  # only for a LiDAR
         for i in range(t.close_count[o]):
             place(w, t.close[o, i], tick)
-        count = look_at(w, own, reach, t.close[o], t.close_count[o])
+        count = look_at(w, o, reach, t.close[o], t.close_count[o])
     cast_shadows(w, count)
     hide_behind_land(w, land, own, count)
-    V = w.vessels.active.shape[0]
+    echo_land(w, land, o, k, sensor, reach, tick, count, stream_land, stream_land + 1)
     now = tick * w.dt_us
     before = now + 1  # when the last source's bias was drawn: nearly all were in the same scan
     a0 = g0 = a1 = g1 = 0.0
     seen = 0
-    for i in range(count):
+    for i in range(count):  # what may be detected moves up
         s = w.order[i]
-        if w.hidden[s]:
+        if w.hidden[i]:
             continue
         t.visible[o, k, s] = 1
-        if w.ranges[s] >= sensor.range_min:
-            w.seen[seen] = s
-            w.slots[seen] = pair_slot(w, o, s)
-            seen += 1
-    draw, seed = w.look, w.seed
-    for i in range(seen):  # vector code: what chance has to say of each
-        slot = w.slots[i]
-        draw[0, i] = rng.uniform(seed, stream_detection, slot, tick)
-        draw[1, i], draw[2, i] = rng.normal2(seed, stream_bias, 2 * slot, tick)
-        draw[3, i], draw[4, i] = rng.normal2(seed, stream_bias, 2 * slot + 1, tick)
-        draw[5, i], draw[6, i] = rng.normal2(seed, stream_noise, 2 * slot, tick)
-    for i in range(seen):
-        s = w.seen[i]
-        d = w.ranges[s]
-        detection = sensor.detection * w.weather.detection_factor
-        if sensor.detection_radius > 0.0:
-            shown = w.widths[s] * w.widths[s]
-            detection *= shown / (shown + sensor.detection_radius * sensor.detection_radius)
-        if draw[0, i] >= detection:
+        if look[RANGE, i] < sensor.range_min:
             continue
         if t.scan_bias_us[o, k, s] != before:
             before = t.scan_bias_us[o, k, s]
             seconds = (now - before) * 1.0e-6 if before >= 0 else -1.0
             a0, g0 = _decay(sensor.bias[0], sensor.bias_time[0], seconds)
             a1, g1 = _decay(sensor.bias[1], sensor.bias_time[1], seconds)
-        t.scan_bias_us[o, k, s] = now
-        b = t.scan_bias[o, k, s]
-        b[0] = a0 * b[0] + g0 * draw[1, i]
-        b[1] = a0 * b[1] + g0 * draw[2, i]
-        b[2] = a1 * b[2] + g1 * draw[3, i]
-        en, ee = b[0] + sensor.noise[0] * draw[5, i], b[1] + sensor.noise[0] * draw[6, i]
-        er = b[2] + sensor.noise[1] * draw[4, i]
-        f = sensor.gain * d
-        if s < V:
-            dn = w.vessels.eta[s, 0] - w.vessels.eta[own, 0]
-            de = w.vessels.eta[s, 1] - w.vessels.eta[own, 1]
-            radius = 0.5 * max(w.vessels.length[s], w.vessels.beam[s])
-        else:
-            dn = w.obstacles.position[s - V, 0] - w.vessels.eta[own, 0]
-            de = w.obstacles.position[s - V, 1] - w.vessels.eta[own, 1]
-            radius = w.obstacles.radius[s - V]
-        dn += f * en
-        de += f * ee
-        t.measured[o, k, s, 0] = w.nav.position[o, 0] + dn
-        t.measured[o, k, s, 1] = w.nav.position[o, 1] + de
-        t.measured[o, k, s, 2] = max(radius + f * er, w.sensors.radius_min)
+        w.order[seen] = s
+        w.slots[seen] = pair_slot(w, o, s)
+        look[DN, seen], look[DE, seen] = look[DN, i], look[DE, i]
+        look[WIDTH, seen], look[RANGE, seen] = look[WIDTH, i], look[RANGE, i]
+        look[RADIUS, seen] = look[RADIUS, i] + 0.5 * max(look[LENGTH, i], look[BEAM, i])
+        look[_A0, seen], look[_G0, seen], look[_A1, seen], look[_G1, seen] = a0, g0, a1, g1
+        for c in range(3):
+            look[_BIAS + c, seen] = g.bias[c, s]
+        seen += 1
+    seed, north, east = w.seed, w.nav.position[o, 0], w.nav.position[o, 1]
+    detection = sensor.detection * w.weather.detection_factor
+    half2 = sensor.detection_radius * sensor.detection_radius
+    gain, floor, noise0, noise1, radius_min = sensor.gain, sensor.gain_floor, sensor.noise[0], sensor.noise[1], w.sensors.radius_min
+    for i in range(seen):  # vector code
+        slot = w.slots[i]
+        b0, b1 = rng.normal2(seed, stream_bias, 2 * slot, tick)
+        b2, v2 = rng.normal2(seed, stream_bias, 2 * slot + 1, tick)
+        v0, v1 = rng.normal2(seed, stream_noise, 2 * slot, tick)
+        shown = look[WIDTH, i] * look[WIDTH, i]
+        chance = detection * (shown / (shown + half2) if half2 > 0.0 else 1.0)
+        look[_FOUND, i] = 1.0 if rng.uniform(seed, stream_detection, slot, tick) < chance else 0.0
+        b0 = look[_A0, i] * look[_BIAS, i] + look[_G0, i] * b0
+        b1 = look[_A0, i] * look[_BIAS + 1, i] + look[_G0, i] * b1
+        b2 = look[_A1, i] * look[_BIAS + 2, i] + look[_G1, i] * b2
+        f = gain * look[RANGE, i]
+        dn = look[DN, i] + f * (b0 + noise0 * v0)
+        de = look[DE, i] + f * (b1 + noise0 * v1)
+        look[_BIAS, i], look[_BIAS + 1, i], look[_BIAS + 2, i] = b0, b1, b2
+        look[DN, i], look[DE, i] = north + dn, east + de
+        look[RADIUS, i] = max(look[RADIUS, i] + f * (b2 + noise1 * v2), radius_min)
         # the controller's side knows the measured range only
-        t.measured[o, k, s, 3] = max(sensor.gain * hypot(dn, de), sensor.gain_floor)
+        look[RANGE, i] = max(gain * hypot(dn, de), floor)
+    found = 0
+    for i in range(seen):
+        if look[_FOUND, i] == 0.0:
+            continue
+        s = w.order[i]
+        for c in range(3):
+            g.bias[c, s] = look[_BIAS + c, i]
+        t.scan_bias_us[o, k, s] = now
+        g.measured[0, s] = look[DN, i]
+        g.measured[1, s] = look[DE, i]
+        g.measured[2, s] = look[RADIUS, i]
+        g.measured[3, s] = look[RANGE, i]
         t.measured_us[o, k, s] = now
-        t.scan_found[o, k] += 1
-    echo_land(w, land, o, k, sensor, reach, tick, count, stream_land, stream_land + 1)
+        found += 1
+    t.scan_found[o, k] = found
     if w.clutter:
         false_alarms(w, o, k, sensor, reach, clutter, tick, stream_clutter)
     t.scan_us[o, k] = now

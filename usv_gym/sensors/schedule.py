@@ -6,8 +6,9 @@ from ..jit import inner, spliced
 from ..world.carry import move_traffic, place
 from ..world.state import MODEL_3DOF
 from .ais import NEVER, next_fire, schedule, transmit, transmits
+from .intake import take_ais
 from .scan import deliver, lidars_know, scan_lidar, scan_radar
-from .tdm import publish, take_ais
+from .tdm import publish
 
 
 @spliced
@@ -19,6 +20,9 @@ def first_events(w):
         w.ais.next_tick[s] = NEVER
         if w.sensors.exteroceptive:
             schedule(w, s, w.tick)
+    for o in range(w.observer.shape[0]):
+        for s in range(S):
+            w.tracks.nearest[o, s] = s
     w.ais_send = w.ais_due = 0
     w.radar_next = next_fire(w.tick, w.dt_us, w.sensors.radar.period_us)
     w.lidar_next = next_fire(w.tick, w.dt_us, w.sensors.lidar.period_us)

@@ -345,23 +345,33 @@ def _nav(O: int) -> Dtype:
     ], align=True)  # fmt: skip
 
 
-def _tracks(O: int, S: int) -> Dtype:
-    """Local filters of each observer and source.  Axis of 2: radar, LiDAR.  Layouts in sensors/tracker.py."""
+def _filters(S: int) -> Dtype:
+    """The filters of one sensor of an observer, each number a row [S], and what they are fed with (layouts: sensors/tracker.py)."""
     return np.dtype([
-        ("stamp_us", i8, (O, S, 3)),  # time of validity of each local filter
-        ("phase", i1, (O, S, 3)),
+        ("x", f8, (6, S)), ("p", f8, (6, S)),  # of sensors/light.py
+        # of radar and LiDAR only: line through the fixes; apparent radius and its bias; the last raw measurement, N, E, radius,
+        # f(d); truth of the sensor error, bias of N, E, radius (unit f(d)); work space of sensors/intake.py
+        ("line", f8, (10, S)), ("size", f8, (2, S)), ("p_size", f8, (3, S)), ("measured", f8, (4, S)), ("bias", f8, (3, S)),
+        ("todo", f8, (S,)),
+    ])  # fmt: skip
+
+
+def _tracks(O: int, S: int) -> Dtype:
+    """Local filters of each observer and source.  Axis of 3: AIS, radar, LiDAR; of 2: radar, LiDAR."""
+    return np.dtype([
+        ("stamp_us", i8, (O, 3, S)),  # time of validity of each local filter
+        ("phase", i1, (O, 3, S)),
         ("id", i4, (O, S)),  # stable target id, 0: no target
         ("ais_timeout_us", f8, (O, S)),  # after the last message
+        ("filters", _filters(S), (O, 3)),
+        # the thesis's filters (sensors/tracker.py)
         ("x_ais", f8, (O, S, NX_AIS)), ("p_ais", f8, (O, S, NP_AIS)),
         ("x_scan", f8, (O, 2, S, NX_SCAN)), ("p_scan", f8, (O, 2, S, NP_SCAN)),
-        ("size", f8, (O, 2, S, 2)), ("p_size", f8, (O, 2, S, 3)),  # apparent radius and its bias
-        ("start", f8, (O, 2, S, 10)),  # two-point initialisation: first fix and running line fit
-        ("scan_bias", f8, (O, 2, S, 3)),  # truth of the sensor error: bias of N, E, radius (unit f(d))
-        ("scan_bias_us", i8, (O, 2, S)),
-        ("measured", f8, (O, 2, S, 4)),  # last raw measurement: N, E, radius, f(d)
-        ("measured_us", i8, (O, 2, S)),
+        ("scan_bias_us", i8, (O, 2, S)),  # of the truth of the sensor error
+        ("measured_us", i8, (O, 2, S)),  # of the last raw measurement
         ("scan_found", i8, (O, 2)),  # how many measurements the last scan has
         ("scan_us", i8, (O, 2)), ("scan_due", i8, (O, 2)),  # stamp of the last scan; tick at which it arrives, -1: did
+        ("nearest", i4, (O, S)),  # all sources by range, as they were at the last look
         # the LiDAR's last look at all sources (sensors/scan.py): tick, from where N, E [m] {n}, largest speed of any [m/s]; and
         # which were within so many metres of its reach, the only ones to look at until things have moved so far
         ("looked_tick", i8, (O,)), ("looked_from", f8, (O, 2)), ("fastest", f8, (O,)), ("slack", f8, (O,)),
@@ -430,12 +440,12 @@ def world_dtype(V: int, M: int, O: int = 1, P: int = 1) -> Dtype:
         # what comes of it: yaw rate [rad/s], velocity N, E [m/s]
         ("steer_how", i1, (V,)), ("steer_north", f8, (V,)), ("steer_east", f8, (V,)), ("steer_heading", f8, (V,)),
         ("steer_speed", f8, (V,)), ("steered_rate", f8, (V,)), ("steered_velocity", f8, (2, V)),
-        # work space of the shadow test (sensors/shadow.py)
-        ("slots", i8, (S,)), ("look", f8, (10, S)),  # rows that are vector code's, also of scans
-        ("ranges", f8, (S,)), ("bearings", f8, (S,)), ("half_angles", f8, (S,)), ("widths", f8, (S,)),  # [m], [rad], [rad], [m]
-        ("order", i4, (S,)), ("seen", i4, (S,)), ("hidden", i1, (S,)),
+        # work space of looks and scans (sensors/shadow.py): distance [m] or its square of every source; by range: which source,
+        # whether it is hidden, its slot in the streams of noise
+        ("ranges", f8, (S,)), ("order", i4, (S,)), ("hidden", i1, (S,)), ("slots", i8, (S,)),
+        ("look", f8, (15, S)),  # rows of numbers, for vector code, also of sensors/tdm.py
         ("lit_from", f8, (2 * S + 2,)), ("lit_to", f8, (2 * S + 2,)),
-        ("estimate_x", f8, (2, 7)), ("estimate_p", f8, (2, 28)),  # of the fusion (sensors/tdm.py)
+        ("estimate_x", f8, (2, 7)), ("estimate_p", f8, (2, 28)),  # of the thesis's fusion (sensors/tdm.py)
     ], align=True)  # fmt: skip
 
 
