@@ -58,6 +58,11 @@ def watch(worlds, seconds, every, *paths):
     return [np.array(samples) for samples in kept]
 
 
+def by_source(measured):
+    """Raw measurements of radar and LiDAR as [.., 2, S, 4] from ``tracks.filters.measured``, [.., 3, 4, S]."""
+    return np.swapaxes(measured[..., 1:, :, :], -1, -2)
+
+
 def wrapped(angle):
     """Angles within [-pi, pi)."""
     return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi

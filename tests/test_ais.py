@@ -142,7 +142,7 @@ def test_latency():
     B, latency = 30, 1.5
     worlds, _ = sea(B, ships={"a": ship(speed_kn=30)}, sensors=only_ais(latency=latency))
     stamp, track, tick = watch(worlds, 60.0, TICK, "ais.inbox_stamp_us", "tracks.stamp_us", "tick")
-    stamp, track, now = stamp[:, :, 0, 1], track[:, :, 0, 1, AIS], tick * TICK
+    stamp, track, now = stamp[:, :, 0, 1], track[:, :, 0, AIS, 1], tick * TICK
     arrived = np.diff(stamp, axis=0) > 0
     delay = (now[1:] - stamp[1:] * 1e-6)[arrived]
     assert len(delay) >= B * 29
@@ -229,7 +229,7 @@ def test_jamming_keeps_everything_out_and_radar_goes_on():
     advance(worlds, 20.0)
     assert worlds["ais"]["stamp_us"][0, 1] > stamp + 15e6  # it is sent
     assert worlds["ais"]["inbox_stamp_us"][0, 0, 1] == stamp  # but not heard
-    assert worlds["tracks"]["phase"][0, 0, 1, AIS] == PHASE_NONE
+    assert worlds["tracks"]["phase"][0, 0, AIS, 1] == PHASE_NONE
     assert worlds["picture"]["id"][0, 0, 1] == id
     assert worlds["picture"]["sensors"][0, 0, 1] == 2  # radar
     worlds["sensors"]["ais_jammed"] = 0

@@ -88,7 +88,7 @@ def test_the_next_one_in_a_slot_knows_nothing_of_its_predecessor(sea):
     spec = {"class": "boat", "speed": 4, "ais": "B", "waypoints": [[-80, -80], [-80, 400]]}
     assert sea.commands.spawn("launch", spec) == source
     assert sea.target("launch") == 0
-    assert sea.env.world["tracks"]["phase"][0, source].tolist() == [0, 0, 0]
+    assert sea.env.world["tracks"]["phase"][0, :, source].tolist() == [0, 0, 0]
     assert sea.env.world["ais"]["sequence"][source] == 0
     sea.wait(4)
     assert sea.target("launch") > old

@@ -13,6 +13,7 @@ from usv_gym.run import plan, resimulate, run
 from usv_gym.scenarios.build import build_worlds
 from usv_gym.tasks.task import TaskConfig
 from usv_gym.voyage import Mission
+from usv_gym.world.state import RADAR
 
 STEPS = 200
 #: random seas, strong wind, and sensors that lose, delay and miss
@@ -182,13 +183,14 @@ CROWD = {
 }
 
 
-def test_inactive_slots_change_no_bit(monkeypatch):
-    given = actions(1, 100)
-    small = started(1, source=CROWD)
+@pytest.mark.parametrize("filters", ["thesis", "light"])
+def test_inactive_slots_change_no_bit(monkeypatch, filters):
+    given, source = actions(1, 100), {**CROWD, "sensors": {**CROWD["sensors"], "tdm": {"filter": filters}}}
+    small = started(1, source=source)
     monkeypatch.setattr(
         "usv_gym.envs.core.build_worlds", lambda scenario, num, capacity: build_worlds(scenario, num, capacity=(20, 40))
     )
-    large = started(1, source=CROWD)
+    large = started(1, source=source)
     # slots in use on an axis of this length: of vessels or of obstacles, and of sources
     used = {n: [0, 1, 2] for n in (8, 16, 20, 40)} | {8 + 16: [0, 1, 2, 8, 9, 10], 20 + 40: [0, 1, 2, 20, 21, 22]}
     # and of the picture, with its stretches of coast
@@ -200,11 +202,16 @@ def test_inactive_slots_change_no_bit(monkeypatch):
         assert small.terms.tobytes() == large.terms.tobytes()
         tracked |= large.worlds["picture"]["id"][0, 0, : 20 + 40] > 0
     assert np.flatnonzero(tracked).tolist() == [1, 2, 20, 21, 22]
-    for group in ("vessels", "routes", "obstacles", "plants", "weather", "safety", "nav", "ais", "tracks", "picture"):
-        for name in small.worlds[group].dtype.names:
-            if name == "close":  # numbers of slots
+    groups = [("tracks", "filters"), *((name,) for name in (
+        "vessels", "routes", "obstacles", "plants", "weather", "safety", "nav", "ais", "tracks", "picture"))]  # fmt: skip
+    for group in groups:
+        one, other = small.worlds, large.worlds
+        for name in group:
+            one, other = one[name], other[name]
+        for name in one.dtype.names:
+            if name in ("close", "nearest", "filters"):  # numbers of slots; a group of its own
                 continue
-            a, b = small.worlds[group][name][0], large.worlds[group][name][0]
+            a, b = one[name][0], other[name][0]
             for axis, (n, m) in enumerate(zip(a.shape, b.shape, strict=True)):
                 if n != m:
                     a, b = a.take(used[n], axis), b.take(used[m], axis)
@@ -230,7 +237,7 @@ def test_radar_noise_does_not_depend_on_our_actions():
     both = np.flatnonzero(seen[0] & seen[1])
     assert len(both) > 3
     # the bias of a target that both have always seen is the same; one that was missed once has forgotten less of it
-    biases = [c.worlds["tracks"]["scan_bias"][0, 0, 0, both] for c in (ahead, about)]
+    biases = [c.worlds["tracks"]["filters"]["bias"][0, 0, RADAR, :, both] for c in (ahead, about)]
     assert (biases[0] == biases[1]).all(axis=1).sum() > 3
 
 
@@ -245,7 +252,7 @@ def poison(worlds):
                     field[part] = np.nan
             elif field.dtype.kind == "f":
                 field[...] = np.nan
-    worlds["ais"]["bias"] = worlds["tracks"]["scan_bias"] = np.nan
+    worlds["ais"]["bias"] = worlds["tracks"]["filters"]["bias"] = np.nan
     worlds["routes"]["waypoint"][:, 1:] = np.nan  # where the others are going
     worlds["routes"]["leg"] = worlds["routes"]["reached"] = -9  # what the own ship believes of its leg is in nav
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sensor_helpers import V, advance, sea, watch
+from sensor_helpers import V, advance, by_source, sea, watch
 
 from usv_gym.config import ConfigError
 from usv_gym.envs.core import Core
@@ -16,7 +16,7 @@ from usv_gym.scenarios.events import PRECIPITATION
 from usv_gym.scenarios.families.failures import KINDS
 from usv_gym.scenarios.loader import load_scenario
 from usv_gym.tasks.task import TaskConfig
-from usv_gym.world.state import EVENTS
+from usv_gym.world.state import EVENTS, RADAR
 
 FERRY = {"class": "ship", "length": 60, "speed": 4.0, "waypoints": [[150, -100], [150, 900]], "ais": "A"}
 TUG = {"class": "boat", "speed": 3.0, "waypoints": [[250, 200], [250, -600]], "ais": "B"}
@@ -32,7 +32,7 @@ WHEN = {"at": 10, "duration": 15}
 OUTPUTS = (
     "vessels.eta", "vessels.nu", "vessels.velocity", "obstacles.position", "plants.command", "plants.n", "plants.alpha",
     "ais.position", "ais.sequence", "ais.received", "nav.position", "nav.sog", "nav.course", "nav.heading",
-    "nav.mru_heading", "nav.yaw_rate", "nav.specific_force", "nav.water_speed", "tracks.measured", "tracks.measured_us",
+    "nav.mru_heading", "nav.yaw_rate", "nav.specific_force", "nav.water_speed", "tracks.filters.measured", "tracks.measured_us",
 )  # fmt: skip
 
 
@@ -42,7 +42,7 @@ def sail(events, seconds=40.0, **keys):
     worlds["plants"]["command"][:, 0, :2, 0] = 0.3
     worlds["plants"]["command"][:, 0, :2, 1:] = 0.1, 1.0
     outputs = dict(zip(OUTPUTS, watch(worlds, seconds, 1.0, *OUTPUTS), strict=True))
-    measured = outputs.pop("tracks.measured")[:, 0, 0]  # [T, 2, S, 4]
+    measured = by_source(outputs.pop("tracks.filters.measured"))[:, 0, 0]  # [T, 2, S, 4]
     stamp = outputs.pop("tracks.measured_us")[:, 0, 0]
     for k, sensor in enumerate(("radar", "lidar")):
         # of the real sources: phantoms are compared by themselves
@@ -241,11 +241,11 @@ def test_false_alarms_come_at_their_rate_in_range_and_go_again():
     own = worlds["nav"]["position"][:, 0]
     born = 0
     for s in phantoms:
-        alive = phase[:, :, 0, s, 1] > 0
+        alive = phase[:, :, 0, RADAR, s] > 0
         born += int((~alive[:-1] & alive[1:]).sum())
     scans = B * seconds / 1.25
     assert 0.3 < born / scans < 0.45  # slots that are held cannot take another
-    measured = worlds["tracks"]["measured"][:, 0, 0, phantoms]
+    measured = by_source(worlds["tracks"]["filters"]["measured"])[:, 0, 0, phantoms]
     assert (np.hypot(*np.moveaxis(measured[..., :2] - own[:, None], -1, 0)) < 1852.0 + 100.0).all()
     targets = ids[:, :, 0, phantoms] > 0
     assert targets.any(axis=(0, 1)).all()

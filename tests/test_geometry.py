@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from usv_gym.jit import kernel
-from usv_gym.sensors.shadow import cast_shadows, look_around
+from usv_gym.sensors.shadow import DE, DN, RANGE, WIDTH, cast_shadows, look_around
 from usv_gym.world import geometry
 from usv_gym.world.land import NO_LAND
 from usv_gym.world.safety import sweep
@@ -40,6 +40,8 @@ def _sweep(worlds):
 
 @kernel
 def _shadow(worlds, reach):
+    for s in range(worlds[0].ranges.shape[0]):
+        worlds[0].tracks.nearest[0, s] = s
     count = look_around(worlds[0], 0, reach)
     cast_shadows(worlds[0], count)
     return count
@@ -180,8 +182,10 @@ def test_shadow_equals_casting_rays():
         w = worlds[0]
         count = _shadow(worlds, 700.0)
         found = w["order"][:count].copy()
-        ranges, bearings, halves = w["ranges"], w["bearings"], w["half_angles"]
-        assert np.all(np.diff(ranges[found]) >= 0)
+        dn, de, ranges = w["look"][DN, :count], w["look"][DE, :count], w["look"][RANGE, :count]
+        bearings, halves = np.arctan2(de, dn), np.arctan2(w["look"][WIDTH, :count], ranges)
+        np.testing.assert_allclose(ranges, np.hypot(dn, de))
+        assert np.all(np.diff(ranges) >= 0)
         expected = [
             math.hypot(*(w["vessels"]["eta"][s, :2] if s < V else w["obstacles"]["position"][s - V])
                        - w["vessels"]["eta"][0, :2]) <= 700.0
@@ -190,16 +194,15 @@ def test_shadow_equals_casting_rays():
         ]  # fmt: skip
         assert count == sum(expected)
         # every elementary interval between two edges of any source has one nearest source
-        edges = np.sort(np.mod(np.concatenate([bearings[found] - halves[found], bearings[found] + halves[found]]), 2 * np.pi))
+        edges = np.sort(np.mod(np.concatenate([bearings - halves, bearings + halves]), 2 * np.pi))
         middles = 0.5 * (edges + np.roll(edges, -1))
         middles[-1] = 0.5 * (edges[-1] + edges[0] + 2 * np.pi)
         seen = set()
         for ray in middles:
-            off = np.abs((ray - bearings[found] + np.pi) % (2 * np.pi) - np.pi)
-            hit = found[off < halves[found]]
+            hit = np.flatnonzero(np.abs((ray - bearings + np.pi) % (2 * np.pi) - np.pi) < halves)
             if len(hit):
-                seen.add(int(hit[np.argmin(ranges[hit])]))
-        assert seen == {int(s) for s in found if not w["hidden"][s]}
+                seen.add(int(found[hit[0]]))
+        assert seen == {int(s) for s, hidden in zip(found, w["hidden"], strict=False) if not hidden}
 
 
 def test_partly_hidden_is_seen_and_wholly_hidden_is_not():
@@ -210,5 +213,6 @@ def test_partly_hidden_is_seen_and_wholly_hidden_is_not():
     m["active"][:3] = 1
     m["radius"][:3] = 10.0, 5.0, 40.0
     m["position"][:3] = (-100.0, 0.0), (-200.0, 1.0), (-300.0, 0.0)  # due south, where bearings jump
-    _shadow(worlds, 1000.0)
-    assert list(w["hidden"][V : V + 3]) == [0, 1, 0]
+    assert _shadow(worlds, 1000.0) == 3
+    assert w["order"][:3].tolist() == [V, V + 1, V + 2]
+    assert w["hidden"][:3].tolist() == [0, 1, 0]

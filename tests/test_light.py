@@ -7,11 +7,13 @@ import math
 import numpy as np
 import pytest
 from numba import njit
+from sensor_helpers import advance, sea
 
+from usv_gym.jit import inner
 from usv_gym.scenarios.build import build_worlds
 from usv_gym.scenarios.loader import load_scenario
-from usv_gym.sensors import light
-from usv_gym.world.state import PHASE_MOTION, PHASE_POSITION
+from usv_gym.sensors import intake, light
+from usv_gym.world.state import PHASE_MOTION, PHASE_NONE, PHASE_POSITION, RADAR
 
 Q, BIAS, T, NOISE = 0.004, 1.6, 10.0, 3.2
 
@@ -103,6 +105,60 @@ def test_fusion_is_the_sum_of_information(phases):
     expected = np.linalg.inv(information)
     np.testing.assert_allclose(P[:3], [expected[0, 0], expected[0, 1], expected[1, 1]], rtol=1e-10)
     np.testing.assert_allclose(x[:4].reshape(2, 2), expected @ weighted, rtol=1e-10)
+
+
+@inner
+def _take(worlds, together):
+    for b in range(worlds.shape[0]):
+        w = worlds[b]
+        if together:
+            intake.take_scan(w, 0, RADAR, w.sensors.radar)
+        else:
+            for s in range(w.tracks.id.shape[1]):
+                if w.tracks.measured_us[0, RADAR - 1, s] == w.tracks.scan_us[0, RADAR - 1]:
+                    intake.take_fix(w, 0, RADAR, s, w.sensors.radar)
+
+
+def test_fixes_taken_together_do_what_each_does_alone():
+    """Scan after scan of targets that stand, set off, sail and stop, some missed, one heard on AIS."""
+    ship = {"class": "boat", "length": 12, "after_last": "stop", "ais": "off"}
+    ships = {
+        "sails": ship | {"speed": 6.0, "waypoints": [[300, 300], [900, 300]]},
+        "stops": ship | {"speed": 8.0, "waypoints": [[-300, 100], [-300, 400]]},
+        "crawls": ship | {"speed": 0.5, "waypoints": [[300, -300], [400, -300]]},
+        "moored": ship | {"speed": 0.0, "waypoints": [[-400, -200], [-300, -200]]},
+        "heard": ship | {"ais": "A", "speed": 5.0, "waypoints": [[500, -500], [500, 500]]},
+    }  # fmt: skip
+    bergs = {f"berg_{i}": {"position": [200.0 * i - 900.0, 600.0], "radius": 8.0} for i in range(9)}
+    worlds, _ = sea(6, ships=ships, obstacles=bergs, sensors={"base": "thesis", "tdm": {"filter": "light"}})
+    worlds["sensors"]["radar"]["outage"] = 1  # its scans are made here
+    scan, t = worlds["sensors"]["radar"][0], worlds["tracks"]
+    rng, seen, changes = np.random.default_rng(3), set(), set()
+    for _ in range(160):
+        advance(worlds, 1.25)
+        now = worlds["tick"] * worlds["dt_us"]
+        truth = np.concatenate([worlds["vessels"]["eta"][..., :2], worlds["obstacles"]["position"]], axis=1)
+        there = np.concatenate([worlds["vessels"]["active"], worlds["obstacles"]["active"]], axis=1).astype(bool)
+        there[:, 0] = False
+        there &= rng.random(there.shape) < np.linspace(1.0, 0.5, 6)[:, None]
+        f = np.maximum(scan["gain"] * np.hypot(*np.moveaxis(truth, -1, 0)), scan["gain_floor"])
+        fixes = [truth[..., i] + f * scan["noise"][0] * rng.normal(size=f.shape) for i in range(2)]
+        t["filters"]["measured"][:, 0, RADAR] = np.stack([*fixes, 8.0 + f * scan["noise"][1] * rng.normal(size=f.shape), f], 1)
+        t["scan_us"][:, 0, RADAR - 1] = now
+        t["measured_us"][:, 0, RADAR - 1] = np.where(there, now[:, None], t["measured_us"][:, 0, RADAR - 1])
+        before = t["phase"][:, 0, RADAR].copy()
+        one_by_one = worlds.copy()
+        _take(worlds, True)
+        _take(one_by_one, False)
+        for name in ("phase", "stamp_us", "id"):
+            np.testing.assert_array_equal(t[name], one_by_one["tracks"][name])
+        for name in ("x", "p", "line", "size", "p_size"):
+            np.testing.assert_allclose(t["filters"][name], one_by_one["tracks"]["filters"][name], rtol=1e-9, atol=1e-12)
+        after = t["phase"][:, 0, RADAR]
+        seen |= {int(phase) for phase in np.unique(after)}
+        changes |= {(int(a), int(b)) for a, b in zip(before.ravel(), after.ravel(), strict=True) if a != b}
+    assert seen == {PHASE_NONE, PHASE_POSITION, PHASE_MOTION}
+    assert changes >= {(PHASE_POSITION, PHASE_MOTION), (PHASE_MOTION, PHASE_POSITION)}
 
 
 def test_is_an_option_of_the_sensors():

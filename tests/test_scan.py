@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from sensor_helpers import NO_NOISE, V, advance, check_error, sea, watch
+from sensor_helpers import NO_NOISE, V, advance, by_source, check_error, sea, watch
 
 from usv_gym.units import DEG, KNOT
 from usv_gym.world.state import LIDAR, RADAR
@@ -70,9 +70,9 @@ def test_a_scan_sees_the_world_of_its_own_tick():
     """Traffic decides twice a second, a scan in between still measures where the ship is then."""
     ferry = {"speed_kn": 30, "waypoints": [[300, -500], [300, 5000]], "ais": "off"}
     worlds, _ = sea(ships={"ferry": ferry}, simulation={"traffic_interval": 0.5}, **NO_NOISE)
-    measured, stamp = watch(worlds, 20.0, 0.25, "tracks.measured", "tracks.measured_us")
+    measured, stamp = watch(worlds, 20.0, 0.25, "tracks.filters.measured", "tracks.measured_us")
     t = stamp[:, 0, 0, R, 1] * 1e-6
-    measured = measured[t > 0, 0, 0, R, 1]
+    measured = by_source(measured)[t > 0, 0, 0, R, 1]
     assert len(set(t)) > 10
     np.testing.assert_allclose(measured[:, 0], 300.0, atol=1e-6)
     np.testing.assert_allclose(measured[:, 1], -500.0 + 30 * KNOT * t[t > 0], atol=1e-6)
@@ -119,7 +119,8 @@ def test_errors_grow_with_distance(k, interval, ranges):
     radius = worlds["obstacles"]["radius"][0, 0]
     if k == R:  # the discs would touch the boat; only what they show matters here
         worlds["safety"]["collided_with"] = -1
-    measured, stamp = watch(worlds, 400 * interval, interval, "tracks.measured", "tracks.measured_us")
+    measured, stamp = watch(worlds, 400 * interval, interval, "tracks.filters.measured", "tracks.measured_us")
+    measured = by_source(measured)
     assert np.all(np.diff(stamp[:, :, 0, k, V : V + 3], axis=0) == round(interval * 1e6))
     truth = worlds["obstacles"]["position"][0, :3]
     (white, bias, time), (white_r, bias_r, time_r) = thesis_variances(k)
@@ -135,7 +136,7 @@ def test_errors_grow_with_distance(k, interval, ranges):
 def test_errors_of_different_targets_and_axes_are_independent():
     worlds, _ = sea(500, obstacles=discs((100, 0), (100, 120), (100, 240)))
     advance(worlds, ROTATION)
-    error = worlds["tracks"]["measured"][:, 0, R, V : V + 3, :2] - worlds["obstacles"]["position"][0, :3]
+    error = by_source(worlds["tracks"]["filters"]["measured"])[:, 0, R, V : V + 3, :2] - worlds["obstacles"]["position"][0, :3]
     correlation = np.corrcoef(error.reshape(500, 6).T)
     assert np.abs(correlation - np.eye(6)).max() < 4 / math.sqrt(500)
 
@@ -143,7 +144,7 @@ def test_errors_of_different_targets_and_axes_are_independent():
 def test_the_tracker_is_told_the_factor_of_the_measured_range():
     worlds, _ = sea(20, obstacles=discs((1000, 0), (1, 120), radius=0.5))
     advance(worlds, ROTATION)
-    measured = worlds["tracks"]["measured"][:, 0]
+    measured = by_source(worlds["tracks"]["filters"]["measured"])[:, 0]
     np.testing.assert_allclose(measured[:, R, V, 3], 0.01 * np.hypot(measured[:, R, V, 0], measured[:, R, V, 1]))
     assert np.ptp(measured[:, R, V, 3]) > 0.1  # a true range would always be the same
     assert np.all(measured[:, L, V + 1, 3] == 0.05)  # the floor
@@ -154,12 +155,12 @@ def test_own_navigation_errors_enter():
     worlds, _ = sea(obstacles=discs((100, 30)), **NO_NOISE)
     worlds["sensors"]["gnss_drift"] = 5.0, -3.0
     advance(worlds, 10.0)
-    shift = worlds["tracks"]["measured"][0, 0, R, V, :2] - worlds["obstacles"]["position"][0, 0]
+    shift = by_source(worlds["tracks"]["filters"]["measured"])[0, 0, R, V, :2] - worlds["obstacles"]["position"][0, 0]
     np.testing.assert_allclose(shift, [5.0, -3.0], atol=1e-9)
     navigation = {"gnss": {"position_std": 2.0}}
     worlds, _ = sea(200, obstacles=discs((100, 30)), sensors={"navigation": navigation})
-    (measured,) = watch(worlds, 50 * ROTATION, ROTATION, "tracks.measured")
-    error = measured[:, :, 0, R, V, :2] - worlds["obstacles"]["position"][0, 0]
+    (measured,) = watch(worlds, 50 * ROTATION, ROTATION, "tracks.filters.measured")
+    error = by_source(measured)[:, :, 0, R, V, :2] - worlds["obstacles"]["position"][0, 0]
     check_error(error, 2.0, 0.0, 0.0)
 
 
@@ -216,7 +217,7 @@ def test_a_scan_arrives_after_its_latency_stamped_with_its_own_time(latency, arr
     """One scan can be under way: what takes longer arrives just before the next one is made."""
     worlds, _ = sea(obstacles=discs((500, 0)), sensors={"radar": {"latency": latency}})
     stamp, tick = watch(worlds, 30.0, TICK, "tracks.stamp_us", "tick")
-    stamp, now = stamp[:, 0, 0, V, RADAR] * 1e-6, tick[:, 0] * TICK
+    stamp, now = stamp[:, 0, 0, RADAR, V] * 1e-6, tick[:, 0] * TICK
     new = np.flatnonzero(np.diff(stamp) > 0) + 1
     assert len(new) >= 22
     np.testing.assert_allclose(now[new] - stamp[new], arrives, atol=1e-6)

@@ -86,7 +86,7 @@ def test_a_sensor_is_dropped_after_two_and_a_half_intervals(bit, interval, keys)
     advance(worlds, 10.0)
     assert worlds["picture"]["sensors"][0, 0, source] & bit
     worlds["sensors"]["radar"]["outage"] = worlds["sensors"]["lidar"]["outage"] = worlds["sensors"]["ais_jammed"] = 1
-    heard = worlds["tracks"]["stamp_us"][0, 0, source].max() * 1e-6
+    heard = worlds["tracks"]["stamp_us"][0, 0, :, source].max() * 1e-6
     id, tick = watch(worlds, 15.0, 0.05, "picture.id", "tick")
     gone = tick[np.flatnonzero(id[:, 0, 0, source] == 0)[0], 0] * 0.05
     assert gone - heard == pytest.approx(2.5 * interval + 0.05, abs=0.05 + 1e-9)
@@ -287,8 +287,10 @@ def test_an_hour_of_the_busy_open_sea_stays_finite():
         assert np.isfinite(picture["position"][:, 0][target]).all()
         assert (picture["covariance"][:, 0, :, [0, 2]].transpose(1, 2, 0)[target] > 0.0).all()
         assert np.isfinite(picture["cog"][:, 0][picture["motion_known"][:, 0] == 1]).all()
-        for name in ("x_ais", "p_ais", "x_scan", "p_scan", "size", "p_size"):
+        for name in ("x_ais", "p_ais", "x_scan", "p_scan"):
             assert np.isfinite(worlds["tracks"][name]).all(), name
+        for name in ("x", "p", "size", "p_size"):
+            assert np.isfinite(worlds["tracks"]["filters"][name]).all(), name
         truth = np.concatenate([worlds["vessels"]["eta"][..., :2], worlds["obstacles"]["position"]], axis=1)
         sources = truth.shape[1]  # the slots that follow are for stretches of coast
         assert error_of(picture["position"][:, 0, :sources], truth)[target[:, :sources]].max() < 150.0

@@ -225,8 +225,9 @@ def run(s, h, x0, P0, z, size, x, P, alpha):
             step(2, xs[1], Ps[1], dt, z[k, t, 2], 1.0, s)
             for i in range(2):
                 scan = s.radar if i == 0 else s.lidar
-                ekf.predict_size(a[i], A[i], dt, scan)
-                ekf.update_size(a[i], A[i], size[k, t, i], 1.0, scan)
+                ekf.decays(scan, dt)
+                ekf.predict_size(a[i], A[i], scan.decay[1], scan.bias[1])
+                ekf.update_size(a[i], A[i], size[k, t, i], 1.0, scan.noise[1])
                 alpha[k, t, i] = a[i, 0]
             alpha[k, t, 2] = fusion.fuse_size(a[0, 0], A[0, 0], a[1, 0], A[1, 0])[0]
             for i in range(3):

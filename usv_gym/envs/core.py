@@ -134,13 +134,12 @@ class Core:
         self.terms, self.reward = self.episodes["terms"], self.episodes["reward"]
         self.terminated, self.truncated = self.episodes["terminated"], self.episodes["truncated"]
         self._what, self._outcome = self.episodes["what"], self.episodes["outcome"]
-        self._closest, self._to_go = self.episodes["closest"], self.episodes["to_go"]
+        self._floats = self.episodes.view(floats_dtype())["floats"]
         self._stepping = False  # ``what`` is STEP in all rows
         self._no_texts = np.full(self.num, OUTCOMES[0], object)
-        self._tick = self.worlds["tick"]
         # by row, for the single environment: making a view costs as much as half a kernel call
         self.row_obs, self.row_actions = list(self.obs), list(self.actions)
-        self._row_floats = list(self.episodes.view(floats_dtype())["floats"])
+        self._row_floats = list(self._floats)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_alone": None}
@@ -190,7 +189,6 @@ class Core:
         self.tracks = track_pool(scenario)
         self._lanes = lanes_for(worlds)
         self._alone: Callable[[], int] | None = None  # one thread's work, bound to the arrays of now
-        self._tick, self._dt = self.worlds["tick"], float(self.worlds["dt"][0])
         simulation = self.scenario.simulation
         self.control_interval = simulation.control_ticks * simulation.dt
         max_steps = int(np.ceil(simulation.duration / self.control_interval - 1e-9))
@@ -348,10 +346,10 @@ class Core:
     def info(self, b: int) -> dict[str, Any]:
         """The info dict of row b after a step."""
         outcome = OUTCOMES[self._outcome.item(b)]
-        closest, to_go, *terms = self._row_floats[b].tolist()
+        time, closest, to_go, *terms = self._row_floats[b].tolist()
         return {
             "reward_terms": named_terms(*terms),
-            "time": self._tick.item(b) * self._dt,
+            "time": time,
             "closest": closest,
             "to_go": to_go,
             "outcome": outcome,
@@ -365,17 +363,16 @@ class Core:
 
         Every key has an array [B], with zeros (None among texts) in the other rows, and a mask under ``_key``.
         """
-        terms = self.terms.T.copy()
+        floats = self._floats.T.copy()
+        time, closest, to_go, *terms = floats
         outcome = self._outcome.copy()
-        time, closest, to_go = self._tick * self._dt, self._closest.copy(), self._to_go.copy()
         texts = _OUTCOME_TEXTS[outcome] if over else self._no_texts.copy()
         success = outcome == _ARRIVAL
         if not (everyone or mask.all()):
             others = ~mask
-            terms[:, others] = 0.0
+            floats[:, others] = 0.0
             texts[others] = None
-            for column in (time, closest, to_go, success):
-                column[others] = 0
+            success[others] = False
         # written out, as this is done in every step
         rewards: dict[str, Any] = {}
         for (key, masked_key), term in zip(_TERM_KEYS, terms, strict=True):

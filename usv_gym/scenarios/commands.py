@@ -295,13 +295,14 @@ class Commands:
         """Make a slot new to every sensor."""
         self._settle()
         w = self._w
-        for group in ("ais", "tracks", "picture"):
-            for name in w[group].dtype.names:
-                array = w[group][name]
+        for group in (w["ais"], w["tracks"], w["tracks"]["filters"], w["picture"]):
+            for name in group.dtype.names:
+                array = group[name]
                 for axis, size in enumerate(array.shape):
                     if size in (len(self.names), len(self.names) + T):  # picture: and stretches of coast
                         array[(slice(None),) * axis + (source,)] = 0
                         break
+        w["tracks"]["nearest"] = np.arange(len(self.names))
         w["ais"]["last_tick"][source] = -1
         w["ais"]["due_tick"][:, source] = w["ais"]["inbox_stamp_us"][:, source] = -1
         w["tracks"]["scan_bias_us"][:, :, source] = -1

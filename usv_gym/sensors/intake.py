@@ -1,6 +1,6 @@
 """Measurements arrive at the Target Detection Module: AIS messages one by one, a scan's fixes all at once.
 
-What one fix does to the filters of its target says ``_take_fix``.  With the light filters (sensors/light.py) the fixes of most
+What one fix does to the filters of its target says ``take_fix``.  With the light filters (sensors/light.py) the fixes of most
 targets do the same: of those that go on moving or standing still, as at the scan before.  They are taken together in vector
 code, by the same functions on the same rows.
 """
@@ -82,11 +82,11 @@ def take_scan(w, o, k, scan):
     else:
         for s in range(t.id.shape[1]):
             if t.measured_us[o, k - 1, s] == now:
-                _take_fix(w, o, k, s, scan)
+                take_fix(w, o, k, s, scan)
 
 
 @inner
-def _take_fix(w, o, k, s, scan):
+def take_fix(w, o, k, s, scan):
     """The last measurement of source s arrives."""
     t, g = w.tracks, w.tracks.filters[o, k]
     stamp = t.measured_us[o, k - 1, s]
@@ -171,7 +171,7 @@ def _take_together(w, o, k, scan, now):
                 if phase == PHASE_MOTION:
                     end_moving = s + 1
                 continue
-        _take_fix(w, o, k, s, scan)
+        take_fix(w, o, k, s, scan)
     if end == 0:
         return
     h = common * 1.0e-6
@@ -182,24 +182,24 @@ def _take_together(w, o, k, scan, now):
     north, east = w.nav.position[o, 0], w.nav.position[o, 1]
     for s in range(end):
         if g.todo[s] == PHASE_POSITION:
-            g.measured[3, s] = f = _factor(g.x[0, s], g.x[1, s], north, east, gain, floor)
+            g.factor[s] = f = _factor(g.x[0, s], g.x[1, s], north, east, gain, floor)
             sets_off = still.average(g.x[:, s], g.p[:, s], g.line[:, s], h, g.measured[0, s], g.measured[1, s], f,
                                      noise, bias, decay, fade, slowness)  # fmt: skip
             g.todo[s] = _CHANGED if sets_off != 0.0 else 1.0
     for s in range(end_moving):
         if g.todo[s] == PHASE_MOTION:
-            f = g.measured[3, s]
+            g.factor[s] = f = g.measured[3, s]
             light.predict(g.x[:, s], g.p[:, s], h, decay, density, bias)
             light.update_position(g.x[:, s], g.p[:, s], g.measured[0, s], g.measured[1, s], f, ekf.white(f, noise))
             g.todo[s] = _CHANGED if light.stopped(g.x[:, s], g.p[:, s]) else 2.0
     for s in range(end):
         if g.todo[s] != 0.0:
             ekf.predict_size(g.size[:, s], g.p_size[:, s], decay_size, bias_size)
-            ekf.update_size(g.size[:, s], g.p_size[:, s], g.measured[2, s], g.measured[3, s], noise_size)
+            ekf.update_size(g.size[:, s], g.p_size[:, s], g.measured[2, s], g.factor[s], noise_size)
     for s in range(end):
         if g.todo[s] == _CHANGED:
             if t.phase[o, k, s] == PHASE_MOTION:
-                phase = light.stop(g.x[:, s], g.p[:, s], g.line[:, s], g.measured[0, s], g.measured[1, s], g.measured[3, s], scan)
+                phase = light.stop(g.x[:, s], g.p[:, s], g.line[:, s], g.measured[0, s], g.measured[1, s], g.factor[s], scan)
             else:
                 phase = light.set_off(g.x[:, s], g.p[:, s], g.line[:, s])
             t.phase[o, k, s] = phase

@@ -41,6 +41,7 @@ def begin_episodes(w, land, tracks, tasks, episodes):
         episode = episodes[o]
         own = w.observer[o]
         episode.step = 0
+        episode.time = 0.0
         for j in range(w.vessels.active.shape[0]):
             w.pairs[o, j].code = w.pairs[o, j].state = 0
         episode.to_go = distance_to_go(w, own)
@@ -107,6 +108,7 @@ def _judge(w, o, task, episode):
     own = w.observer[o]
     r, terms = w.routes, episode.terms
     episode.step += 1
+    episode.time = w.tick * w.dt
     closest = w.safety.step_closest[o]
     episode.closest = min(episode.closest, closest)
     to_go = distance_to_go(w, own)

@@ -150,8 +150,9 @@ def episode_dtype() -> np.dtype[Any]:
     return np.dtype([
         ("what", "i1"), ("action", "f8", (3 * A,)),  # in: tasks/step.py, BEGIN or STEP; channels of the action
         ("reward", "f8"),  # out
-        # smallest hull distance to anything since reset [m]; distance to go along the route [m]; floats_dtype() sees all as one
-        ("closest", "f8"), ("to_go", "f8"), ("terms", "f8", (N_TERMS,)),
+        # time since reset [s]; smallest hull distance to anything since then [m]; distance to go along the route [m];
+        # floats_dtype() sees all as one
+        ("time", "f8"), ("closest", "f8"), ("to_go", "f8"), ("terms", "f8", (N_TERMS,)),
         ("terminated", "?"), ("truncated", "?"), ("step", "i8"),  # steps so far
         ("heading_ref", "f8"), ("speed_ref", "f8"),  # of heading_speed and discrete
         ("last_action", "f8", (3 * A,)), ("change", "f8"),  # mean squared change of the action in this step
@@ -162,10 +163,10 @@ def episode_dtype() -> np.dtype[Any]:
 
 @functools.cache
 def floats_dtype() -> np.dtype[Any]:
-    """Overlay of ``episode_dtype``: ``closest``, ``to_go`` and ``terms`` as one row ``floats``, which is read at once."""
+    """Overlay of ``episode_dtype``: ``time``, ``closest``, ``to_go`` and ``terms`` as one row ``floats``, which is read at once."""
     whole = episode_dtype()
     assert whole.fields is not None
-    return np.dtype({"names": ["floats"], "formats": [("f8", (2 + N_TERMS,))], "offsets": [whole.fields["closest"][1]],
+    return np.dtype({"names": ["floats"], "formats": [("f8", (3 + N_TERMS,))], "offsets": [whole.fields["time"][1]],
                      "itemsize": whole.itemsize})  # fmt: skip
 
 

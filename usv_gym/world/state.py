@@ -352,7 +352,7 @@ def _filters(S: int) -> Dtype:
         # of radar and LiDAR only: line through the fixes; apparent radius and its bias; the last raw measurement, N, E, radius,
         # f(d); truth of the sensor error, bias of N, E, radius (unit f(d)); work space of sensors/intake.py
         ("line", f8, (10, S)), ("size", f8, (2, S)), ("p_size", f8, (3, S)), ("measured", f8, (4, S)), ("bias", f8, (3, S)),
-        ("todo", f8, (S,)),
+        ("todo", f8, (S,)), ("factor", f8, (S,)),
     ])  # fmt: skip
 
 
