@@ -24,13 +24,15 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import codegen, event
+from numba.core import codegen, event, types
+from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: FMA contraction only: NaN still behaves, and results are the same on every CPU that has FMA.  Nothing here is passed as a C
-#: callback, so the wrappers for it, a twentieth of the compile time, are left out.
-_FLAGS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+#: No fast mathematics: results are the same on every machine, whatever becomes vector code there (``fma`` says where a product
+#: is added unrounded).  Nothing here is passed as a C callback, so the wrappers for it, a twentieth of the compile time, are
+#: left out.
+_FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
 
 def _allow_wide_vectors() -> None:
@@ -47,6 +49,19 @@ def _allow_wide_vectors() -> None:
 
 
 _allow_wide_vectors()
+
+
+@intrinsic
+def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    """a b + c, rounded once: one instruction, also in vector code.
+
+    LLVM could find such places by itself, but not the same ones in scalar code and in vectors of either width.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
 
 
 def inner(function: F) -> F:

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from .jit import scalar
+from .jit import fma, scalar
 
 PI = math.pi
 TWO_PI = 2.0 * math.pi
@@ -28,19 +28,21 @@ _ABOVE_ROOT = np.int64(0x3FF0000000000000 - 0x3FE6A09E667F3BCD)  # bits of 1 les
 @scalar
 def _octant(x):
     """Sine and cosine of x less the nearest multiple n of pi/2, and n."""
-    n = np.floor(x * (2.0 / PI) + 0.5)
+    n = np.floor(fma(x, 2.0 / PI, 0.5))
     m = 2.0 * n
-    y = ((x - m * _PIO4_1) - m * _PIO4_2) - m * _PIO4_3
+    y = fma(m, -_PIO4_3, fma(m, -_PIO4_2, fma(m, -_PIO4_1, x)))
     z = y * y
-    s = y + y * z * (
-        (((((1.58962301576546568060e-10 * z - 2.50507477628578072866e-8) * z + 2.75573136213857245213e-6) * z
-           - 1.98412698295895385996e-4) * z + 8.33333333332211858878e-3) * z) - 1.66666666666666307295e-1
-    )
-    c = 1.0 - 0.5 * z + z * z * (
-        ((((-1.13585365213876817300e-11 * z + 2.08757008419747316778e-9) * z - 2.75573141792967388112e-7) * z
-          + 2.48015872888517045348e-5) * z - 1.38888888888730564116e-3) * z + 4.16666666666665929218e-2
-    )
-    return s, c, np.int64(n)
+    p = fma(z, 1.58962301576546568060e-10, -2.50507477628578072866e-8)
+    p = fma(z, p, 2.75573136213857245213e-6)
+    p = fma(z, p, -1.98412698295895385996e-4)
+    p = fma(z, p, 8.33333333332211858878e-3)
+    p = fma(z, p, -1.66666666666666307295e-1)
+    q = fma(z, -1.13585365213876817300e-11, 2.08757008419747316778e-9)
+    q = fma(z, q, -2.75573141792967388112e-7)
+    q = fma(z, q, 2.48015872888517045348e-5)
+    q = fma(z, q, -1.38888888888730564116e-3)
+    q = fma(z, q, 4.16666666666665929218e-2)
+    return fma(y * z, p, y), fma(z * z, q, fma(z, -0.5, 1.0)), np.int64(n)
 
 
 @scalar
@@ -62,7 +64,8 @@ def sincos_random(x):
     s, c, q = _octant(x)
     swap = np.float64(q & 1)
     keep = 1.0 - swap
-    return (1.0 - np.float64(q & 2)) * (keep * s + swap * c), (1.0 - np.float64((q + 1) & 2)) * (keep * c + swap * s)
+    sine, cosine = fma(keep, s, swap * c), fma(keep, c, swap * s)
+    return (1.0 - np.float64(q & 2)) * sine, (1.0 - np.float64((q + 1) & 2)) * cosine
 
 
 @scalar
@@ -76,11 +79,16 @@ def atan2(y, x):
     w = (top - bottom if far else top) / max(top + bottom if far else bottom, 2.2250738585072014e-308)
     z = w * w
     u = z * z
-    odd = z * (3.33333333333329318027e-01 + u * (1.42857142725034663711e-01 + u * (9.09088713343650656196e-02
-        + u * (6.66107313738753120669e-02 + u * (4.97687799461593236017e-02 + u * 1.62858201153657823623e-02)))))  # fmt: skip
-    even = u * (-1.99999999998764832476e-01 + u * (-1.11111104054623557880e-01 + u * (-7.69187620504482999495e-02
-        + u * (-5.83357013379057348645e-02 + u * -3.65315727442169155270e-02))))  # fmt: skip
-    a = w - w * (odd + even)
+    odd = fma(u, 1.62858201153657823623e-02, 4.97687799461593236017e-02)
+    odd = fma(u, odd, 6.66107313738753120669e-02)
+    odd = fma(u, odd, 9.09088713343650656196e-02)
+    odd = fma(u, odd, 1.42857142725034663711e-01)
+    odd = fma(u, odd, 3.33333333333329318027e-01)
+    even = fma(u, -3.65315727442169155270e-02, -5.83357013379057348645e-02)
+    even = fma(u, even, -7.69187620504482999495e-02)
+    even = fma(u, even, -1.11111104054623557880e-01)
+    even = fma(u, even, -1.99999999998764832476e-01)
+    a = fma(-w, fma(z, odd, u * even), w)
     a = a + 0.25 * PI if far else a
     a = 0.5 * PI - a if ay > ax else a
     a = PI - a if x < 0.0 else a
@@ -97,11 +105,15 @@ def log(x):
     f = np.int64((shifted & _MANTISSA) - _ABOVE_ROOT + _ONE).view(np.float64) - 1.0
     s = f / (2.0 + f)
     z = s * s
-    r = z * (6.666666666666735130e-01 + z * (3.999999999940941908e-01 + z * (2.857142874366239149e-01
-        + z * (2.222219843214978396e-01 + z * (1.818357216161805012e-01 + z * (1.531383769920937332e-01
-        + z * 1.479819860511658591e-01))))))  # fmt: skip
+    r = fma(z, 1.479819860511658591e-01, 1.531383769920937332e-01)
+    r = fma(z, r, 1.818357216161805012e-01)
+    r = fma(z, r, 2.222219843214978396e-01)
+    r = fma(z, r, 2.857142874366239149e-01)
+    r = fma(z, r, 3.999999999940941908e-01)
+    r = fma(z, r, 6.666666666666735130e-01)
     half = 0.5 * f * f
-    return k * 6.93147180369123816490e-01 - ((half - (s * (half + r) + k * 1.90821492927058770002e-10)) - f)
+    small = fma(s, fma(z, r, half), k * 1.90821492927058770002e-10)
+    return fma(k, 6.93147180369123816490e-01, f - (half - small))
 
 
 @scalar
@@ -109,12 +121,15 @@ def exp(x):
     """e to the power of x, for x up to 700; below -700 as at -700."""
     x = -700.0 if x < -700.0 else x
     k = np.floor(x * 1.44269504088896338700 + 0.5)
-    high = x - k * 6.93147180369123816490e-01
+    high = fma(k, -6.93147180369123816490e-01, x)
     low = k * 1.90821492927058770002e-10
     r = high - low
     t = r * r
-    c = r - t * (1.66666666666666019037e-01 + t * (-2.77777777770155933842e-03 + t * (6.61375632143793436117e-05
-        + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08))))  # fmt: skip
+    p = fma(t, 4.13813679705723846039e-08, -1.65339022054652515390e-06)
+    p = fma(t, p, 6.61375632143793436117e-05)
+    p = fma(t, p, -2.77777777770155933842e-03)
+    p = fma(t, p, 1.66666666666666019037e-01)
+    c = fma(-t, p, r)
     y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
     return y * np.int64((np.int64(k) + 1023) << 52).view(np.float64)
 
@@ -122,19 +137,19 @@ def exp(x):
 @scalar
 def hypot(x, y):
     """Length of a vector; of sizes of which the square is a number."""
-    return math.sqrt(x * x + y * y)
+    return math.sqrt(fma(x, x, y * y))
 
 
 @scalar
 def wrap(angle):
     """Angle [rad] wrapped to [-pi, pi)."""
-    return angle - TWO_PI * np.floor(angle * (1.0 / TWO_PI) + 0.5)
+    return fma(np.floor(fma(angle, 1.0 / TWO_PI, 0.5)), -TWO_PI, angle)
 
 
 @scalar
 def wrap_positive(angle):
     """Angle [rad] wrapped to [0, 2 pi)."""
-    a = angle - TWO_PI * np.floor(angle * (1.0 / TWO_PI))
+    a = fma(np.floor(angle * (1.0 / TWO_PI)), -TWO_PI, angle)
     return 0.0 if a >= TWO_PI else a
 
 
