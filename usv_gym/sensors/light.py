@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..jit import inner, scalar
+from ..jit import fma, inner, scalar
 from ..trig import exp, sincos
 from ..world.state import PHASE_MOTION, PHASE_NONE, PHASE_POSITION
 from . import ekf, still
@@ -67,18 +67,20 @@ def update_velocity(x, P, vn, ve, variance):
 
 @scalar
 def _correct(x, P, s, gp, gv, gb, dn, de):
-    x[0] += gp * dn
-    x[1] += gp * de
-    x[2] += gv * dn
-    x[3] += gv * de
-    x[4] += gb * dn
-    x[5] += gb * de
-    P[0] -= s * gp * gp
-    P[1] -= s * gp * gv
-    P[2] -= s * gv * gv
-    P[3] -= s * gp * gb
-    P[4] -= s * gv * gb
-    P[5] -= s * gb * gb
+    x[0] = fma(gp, dn, x[0])
+    x[1] = fma(gp, de, x[1])
+    x[2] = fma(gv, dn, x[2])
+    x[3] = fma(gv, de, x[3])
+    x[4] = fma(gb, dn, x[4])
+    x[5] = fma(gb, de, x[5])
+    t = -s * gp
+    P[0] = fma(t, gp, P[0])
+    P[1] = fma(t, gv, P[1])
+    P[3] = fma(t, gb, P[3])
+    t = -s * gv
+    P[2] = fma(t, gv, P[2])
+    P[4] = fma(t, gb, P[4])
+    P[5] = fma(-s * gb, gb, P[5])
 
 
 @inner
