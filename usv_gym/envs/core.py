@@ -30,8 +30,8 @@ from ..tasks.task import (
     Vessel,
     action_space,
     episode_dtype,
-    floats_dtype,
     named_terms,
+    results_dtype,
     observation_size,
     observation_space,
     resolve_action,
@@ -46,7 +46,6 @@ from ..world.vessel import VesselModel, load_vessel
 from .threads import Crew
 
 _OUTCOME_TEXTS = np.array(OUTCOMES, object)
-_ARRIVAL = OUTCOMES.index("arrival")
 _TERM_KEYS = tuple((term, f"_{term}") for term in TERMS)
 _WORTH_SHARING = 16  # rows; fewer are done by one thread before another wakes up
 NO_ROWS = np.zeros((0, 0, A, 3))
@@ -134,12 +133,13 @@ class Core:
         self.terms, self.reward = self.episodes["terms"], self.episodes["reward"]
         self.terminated, self.truncated = self.episodes["terminated"], self.episodes["truncated"]
         self._what, self._outcome = self.episodes["what"], self.episodes["outcome"]
-        self._floats = self.episodes.view(floats_dtype())["floats"]
+        results = self.episodes.view(results_dtype())
+        self._numbers, self._flags = results["numbers"], results["flags"]
         self._stepping = False  # ``what`` is STEP in all rows
         self._no_texts = np.full(self.num, OUTCOMES[0], object)
         # by row, for the single environment: making a view costs as much as half a kernel call
         self.row_obs, self.row_actions = list(self.obs), list(self.actions)
-        self._row_floats = list(self._floats)
+        self._row_numbers = list(self._numbers)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_alone": None}
@@ -346,7 +346,7 @@ class Core:
     def info(self, b: int) -> dict[str, Any]:
         """The info dict of row b after a step."""
         outcome = OUTCOMES[self._outcome.item(b)]
-        time, closest, to_go, *terms = self._row_floats[b].tolist()
+        _, time, closest, to_go, *terms = self._row_numbers[b].tolist()
         return {
             "reward_terms": named_terms(*terms),
             "time": time,
@@ -356,21 +356,27 @@ class Core:
             "is_success": outcome == "arrival",
         }
 
-    def infos(self, mask: NDArray[np.bool_], everyone: bool = False, over: bool = True) -> dict[str, Any]:
+    def results(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int8]]:
+        """Copies of all rows' numbers [reward, time, closest, to_go and terms, B], flags [terminated, truncated, over and success,
+        B] and outcomes [B].
+        """  # noqa: D205
+        flags = self._flags.T.copy()
+        return self._numbers.T.copy(), flags[:4].view(np.bool_), flags[4].view(np.int8)
+
+    def infos(self, mask: NDArray[np.bool_], results: Any = None, over: bool = True) -> dict[str, Any]:
         """The info dicts of the rows of ``mask`` [B] as Gymnasium's vector environments batch them.
 
-        ``everyone``: the mask is known to be all true; not ``over``: no episode is known to have ended.
+        ``results``: those of now, where the mask is known to be all true; not ``over``: no episode is known to have ended.
 
         Every key has an array [B], with zeros (None among texts) in the other rows, and a mask under ``_key``.
         """
-        floats = self._floats.T.copy()
-        time, closest, to_go, *terms = floats
-        outcome = self._outcome.copy()
+        numbers, flags, outcome = results or self.results()
+        _, time, closest, to_go, *terms = numbers
         texts = _OUTCOME_TEXTS[outcome] if over else self._no_texts.copy()
-        success = outcome == _ARRIVAL
-        if not (everyone or mask.all()):
+        success = flags[3]
+        if results is None and not mask.all():
             others = ~mask
-            floats[:, others] = 0.0
+            numbers[:, others] = 0.0
             texts[others] = None
             success[others] = False
         # written out, as this is done in every step

@@ -273,9 +273,9 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
             self.advance(actions)
         else:
             self.advance(actions)
-        reward, terminated, truncated = core.reward.copy(), core.terminated.copy(), core.truncated.copy()
-        over = terminated | truncated
-        any_over = bool(over.any())
+        results = core.results()
+        reward, (terminated, truncated, over, _) = results[0][0], results[1]
+        any_over = np.count_nonzero(over) > 0
         infos: dict[str, Any] = {}
         restarted, any_restarted = ended, any_ended
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
@@ -286,8 +286,9 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
                     last[b] = self.observation(b)
                 infos = masked({"final_obs": last, "final_info": core.infos(over)}, over)
                 self.begin(over)
+                results = core.results()
         self._ended, self._any_ended = over, any_over
-        infos.update(core.infos(self._all.copy(), everyone=True, over=any_over))
+        infos.update(core.infos(self._all.copy(), results, any_over))
         if any_restarted:
             self._reset_infos(infos, restarted)
         return self.observation(), reward, terminated, truncated, infos

@@ -105,15 +105,23 @@ def start(x, P, vn, ve, variance, age):
 def ais_velocity(psi, u, h, sensors):
     """Velocity N, E [m/s] that COG and SOG say, and its variance per axis; h [s] is the time from message to message."""
     sine, cosine = sincos(psi)
-    along = _variance(sensors.ais_noise[4], sensors.ais_bias[4], sensors.ais_bias_time[4], h)
-    across = u * u * _variance(sensors.ais_noise[2], sensors.ais_bias[2], sensors.ais_bias_time[2], h)
+    T = sensors.ais_bias_time[4]
+    a = _decay(T, h)
+    along = _variance(sensors.ais_noise[4], sensors.ais_bias[4], a)
+    if sensors.ais_bias_time[2] != T:  # most are equal, and an exponential is dear
+        a = _decay(sensors.ais_bias_time[2], h)
+    across = u * u * _variance(sensors.ais_noise[2], sensors.ais_bias[2], a)
     return u * cosine, u * sine, max(along, across)
 
 
 @inner
-def _variance(noise, bias, bias_time, h):
-    """Variance of white noise that lets means converge as slowly as this noise with its bias does (see ``tracker``)."""
-    a = exp(-h / bias_time) if bias_time > 0.0 and h > 0.0 else 0.0
+def _decay(bias_time, h):
+    return exp(-h / bias_time) if bias_time > 0.0 and h > 0.0 else 0.0
+
+
+@scalar
+def _variance(noise, bias, a):
+    """Variance of white noise that lets means converge as slowly as this noise with its bias of decay a does (see ``still``)."""
     return ekf.white(1.0, noise) + bias * bias * (1.0 + a) / (1.0 - a)
 
 

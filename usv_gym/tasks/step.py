@@ -52,7 +52,7 @@ def begin_episodes(w, land, tracks, tasks, episodes):
         episode.closest = math.inf
         episode.outcome = 0
         episode.reward = 0.0
-        episode.terminated = episode.truncated = False
+        episode.terminated = episode.truncated = episode.over = episode.success = False
         for i in range(episode.terms.shape[0]):
             episode.terms[i] = 0.0
 
@@ -148,6 +148,8 @@ def _judge(w, o, task, episode):
         episode.outcome = 1 if collision else (5 if grounding else (2 if arrival else (3 if outside else 4)))
     episode.terminated = terminated
     episode.truncated = truncated
+    episode.over = terminated or truncated
+    episode.success = episode.outcome == 2
 
 
 @inner
