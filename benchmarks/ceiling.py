@@ -31,7 +31,7 @@ nozzle_max bucket thrust_left nozzle_stuck lag command n alpha beta
 LAST = "memory memory_scale memory_den memory_num memory_x"
 
 
-@njit(fastmath={"contract"}, error_model="numpy", nogil=True)
+@njit(error_model="numpy", nogil=True)
 def _advance(worlds: Any, lanes: Any, ticks: int, h: float) -> None:
     for group in range(lanes.shape[0]):
         g, first = lanes[group, 0], group * LANES

@@ -222,22 +222,24 @@ def test_inactive_slots_change_no_bit(monkeypatch, filters):
 def test_vectors_of_any_length_give_the_same_bits(monkeypatch, filters):
     """Loops over slots become vector code with a rest, and other slots are in the rest where there are more of them."""
     rng = np.random.default_rng(8)
-    ships = {f"ship_{i}": {"class": "boat", "ais": "B", "speed": 4.0,
-                           "waypoints": rng.uniform(-700, 700, (3, 2)).tolist(), "after_last": "loop"} for i in range(7)}  # fmt: skip
+    boat = {"class": "boat", "ais": "B", "speed": 4.0, "after_last": "loop"}
+    ships = {f"ship_{i}": boat | {"waypoints": rng.uniform(-700, 700, (3, 2)).tolist()} for i in range(7)}
     bergs = {f"berg_{i}": {"position": rng.uniform(-900, 900, 2).tolist(), "radius": 6.0 + i} for i in range(15)}
     source = {**CROWD, "ships": ships, "obstacles": bergs, "sensors": {"base": "thesis", "tdm": {"filter": filters}}}
     rows = []
     for V, M in ((8, 16), (20, 40)):
         with monkeypatch.context() as patch:
-            patch.setattr("usv_gym.envs.core.build_worlds",
-                          lambda scenario, num, capacity, slots=(V, M): build_worlds(scenario, num, capacity=slots))  # fmt: skip
+            patch.setattr(
+                "usv_gym.envs.core.build_worlds",
+                lambda scenario, num, capacity, slots=(V, M): build_worlds(scenario, num, capacity=slots),
+            )
             sea = started(1, source=source)
         row = []
         for now in actions(1, 60):
             roll(sea, [now])
-            picture = sea.worlds["picture"]
             targets = [*range(1, 8), *range(V, V + 15)]
-            row.append((sea.obs.tobytes(), *(picture[name][0, 0, targets].tobytes() for name in ("position", "covariance", "radius"))))
+            said = [sea.worlds["picture"][name][0, 0, targets].tobytes() for name in ("position", "covariance", "radius")]
+            row.append((sea.obs.tobytes(), *said))
         rows.append(row)
     assert rows[0] == rows[1]
 

@@ -35,7 +35,8 @@ CLOSE = {
 #: work space, and what the LiDAR remembers; how far ships have sailed, which is added up at every look
 LEFT_OUT = (
     "look", "slots", "order", "hidden", "ranges", "lit_from", "lit_to", "near", "end", "hull", "estimate_x", "estimate_p",
-    "todo", "factor", "elapsed", "decay", "fade", "slowness", "nearest", "look_tick", "looked_tick", "looked_from", "slack", "fastest", "close", "close_count", "distance",
+    "todo", "factor", "elapsed", "decay", "fade", "slowness", "nearest", "look_tick",
+    "looked_tick", "looked_from", "slack", "fastest", "close", "close_count", "distance",
 )  # fmt: skip
 
 

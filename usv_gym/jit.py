@@ -41,9 +41,9 @@ def _allow_wide_vectors() -> None:
     LLVM keeps to 256 bits on all of Intel's, because of the older ones.  What is chosen in the environment stays, and so does
     what a process has compiled before.
     """
-    config: Any = numba.config  # type: ignore[attr-defined]
+    config: Any = numba.config
     if config.CPU_FEATURES is None and config.CPU_NAME is None:
-        features = codegen.get_host_cpu_features()
+        features: str = codegen.get_host_cpu_features()  # type: ignore[no-untyped-call]
         if "+avx512vbmi2" in features:
             config.CPU_FEATURES = f"{features},-prefer-256-bit"
 

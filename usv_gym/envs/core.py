@@ -24,14 +24,15 @@ from ..scenarios.schema import Scenario, Weather
 from ..tasks.share import ALONE, NO_CONTROL
 from ..tasks.step import BEGIN, STEP, observe_batch, run_batch
 from ..tasks.task import (
+    N_TERMS,
     OUTCOMES,
     TERMS,
     TaskConfig,
     Vessel,
     action_space,
     episode_dtype,
+    floats_dtype,
     named_terms,
-    results_dtype,
     observation_size,
     observation_space,
     resolve_action,
@@ -125,6 +126,8 @@ class Core:
         # one observer per world; the kernel knows of more
         self._obs = np.zeros((num, 1, observation_size(self.config)), np.float32)
         self._episodes = np.zeros((num, 1), episode_dtype())
+        # the same of all rows in columns, for vector faces: see run_batch
+        self._numbers, self._flags = np.zeros((4 + N_TERMS, num)), np.zeros((5, num), np.uint8)
         self._name_views()
 
     def _name_views(self) -> None:
@@ -133,13 +136,11 @@ class Core:
         self.terms, self.reward = self.episodes["terms"], self.episodes["reward"]
         self.terminated, self.truncated = self.episodes["terminated"], self.episodes["truncated"]
         self._what, self._outcome = self.episodes["what"], self.episodes["outcome"]
-        results = self.episodes.view(results_dtype())
-        self._numbers, self._flags = results["numbers"], results["flags"]
         self._stepping = False  # ``what`` is STEP in all rows
         self._no_texts = np.full(self.num, OUTCOMES[0], object)
         # by row, for the single environment: making a view costs as much as half a kernel call
         self.row_obs, self.row_actions = list(self.obs), list(self.actions)
-        self._row_numbers = list(self._numbers)
+        self._row_floats = list(self.episodes.view(floats_dtype())["floats"])
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_alone": None}
@@ -320,7 +321,8 @@ class Core:
         return self.crew.run(run_batch, *self._arguments(rows))
 
     def _arguments(self, rows: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
-        return self.worlds, self._lanes, self.land, self.tracks, self.task, self._episodes, self._obs, rows
+        results = self._episodes, self._obs, self._numbers, self._flags
+        return self.worlds, self._lanes, self.land, self.tracks, self.task, *results, rows
 
     def observe(self) -> NDArray[np.float32]:
         """Observations [B, n] of the records as they are now; does not advance anything."""
@@ -346,7 +348,7 @@ class Core:
     def info(self, b: int) -> dict[str, Any]:
         """The info dict of row b after a step."""
         outcome = OUTCOMES[self._outcome.item(b)]
-        _, time, closest, to_go, *terms = self._row_numbers[b].tolist()
+        time, closest, to_go, *terms = self._row_floats[b].tolist()
         return {
             "reward_terms": named_terms(*terms),
             "time": time,
@@ -356,12 +358,13 @@ class Core:
             "is_success": outcome == "arrival",
         }
 
-    def results(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int8]]:
-        """Copies of all rows' numbers [reward, time, closest, to_go and terms, B], flags [terminated, truncated, over and success,
-        B] and outcomes [B].
-        """  # noqa: D205
-        flags = self._flags.T.copy()
-        return self._numbers.T.copy(), flags[:4].view(np.bool_), flags[4].view(np.int8)
+    def results(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.uint8]]:
+        """Copies of numbers [4 + terms, B], flags [4, B] and outcomes [B] of all rows.
+
+        Numbers are reward, time, closest, to_go and the terms; flags terminated, truncated, either, arrived.
+        """
+        flags = self._flags.copy()
+        return self._numbers.copy(), flags[:4].view(np.bool_), flags[4]
 
     def infos(self, mask: NDArray[np.bool_], results: Any = None, over: bool = True) -> dict[str, Any]:
         """The info dicts of the rows of ``mask`` [B] as Gymnasium's vector environments batch them.

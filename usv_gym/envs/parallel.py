@@ -22,6 +22,7 @@ from ..scenarios.loader import load_scenario
 from ..tasks.share import ALONE, NO_CONTROL
 from ..tasks.step import BEGIN, STEP, run_batch
 from ..tasks.task import (
+    N_TERMS,
     OUTCOMES,
     action_space,
     episode_dtype,
@@ -130,6 +131,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         self._template = self.worlds.copy()
         self._obs = np.zeros((1, MAX_AGENTS, observation_size(config)), np.float32)
         self._episodes = np.zeros((1, MAX_AGENTS), episode_dtype())
+        self._columns = np.zeros((4 + N_TERMS, 1)), np.zeros((5, 1), np.uint8)  # of the first agent alone, so nobody reads them
         self._rng: np.random.Generator | None = None
         self._history: Any = None  # trails of the map
         w = self.worlds[0]
@@ -163,7 +165,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
 
     def _run(self) -> int:
         return int(run_batch(NO_CONTROL, ALONE, self.worlds, self._lanes, NO_LAND, self._tracks, self._tasks, self._episodes,
-                             self._obs, NO_ROWS))  # fmt: skip
+                             self._obs, *self._columns, NO_ROWS))  # fmt: skip
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """One control step of all agents that are left.

@@ -275,7 +275,7 @@ class USVVectorEnv(gym.vector.VectorEnv[Any, Any, NDArray[Any]]):
             self.advance(actions)
         results = core.results()
         reward, (terminated, truncated, over, _) = results[0][0], results[1]
-        any_over = np.count_nonzero(over) > 0
+        any_over = 1 in over.tobytes()  # far sooner than any()
         infos: dict[str, Any] = {}
         restarted, any_restarted = ended, any_ended
         if self.autoreset_mode is AutoresetMode.SAME_STEP:

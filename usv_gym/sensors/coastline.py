@@ -83,7 +83,7 @@ def _look_between(w, land, h, n, e, i, reach, count, echo):
 
 @spliced
 def echo_land(w, land, o, k, sensor, reach, tick, count, stream_noise, stream_detection):
-    """What a scan of radar (k = 0) or LiDAR (k = 1) of observer o gets back from land, between the ``count`` sources of the look."""
+    """What a scan of radar (k = 0) or LiDAR (k = 1) of observer o gets back from land, between the sources of its look."""
     h = coast(land, w.land_id)
     if h == 0:
         return

@@ -144,7 +144,7 @@ def take_fix(w, o, k, s, scan):
 
 @inner
 def _factor(n, e, north, east, gain, floor):
-    """f(d) at the range of an estimate n, e: by their own, fixes that are too near count for more and pull the target nearer."""
+    """f(d) at the range of an estimate n, e: by their own, fixes that are too near would count for more and pull it nearer."""
     return max(gain * hypot(n - north, e - east), floor)
 
 

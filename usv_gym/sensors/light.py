@@ -10,8 +10,8 @@ state for it cannot follow, counted as white noise that lets means converge as s
 A target that does not move is averaged by the static filter of ``ekf``, and starts to move by the same test (``still``), as
 with the thesis's filters (``tracker``).  ``sensors``, ``scan`` and ``h``: see ``ekf``.  docs/tracking.md compares the two.
 
-Arrays are 1-D, or columns of the rows of all targets, for which ``predict``, ``update_position``, ``stopped``, ``predicted`` and
-``fuse`` become vector code (sensors/intake.py, sensors/tdm.py).
+Arrays are 1-D, or columns of the rows of all targets, for which ``predict``, ``update_position``, ``stopped``, ``predicted``
+and ``fuse`` become vector code (sensors/intake.py, sensors/tdm.py).
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def _decay(bias_time, h):
 
 @scalar
 def _variance(noise, bias, a):
-    """Variance of white noise that lets means converge as slowly as this noise with its bias of decay a does (see ``still``)."""
+    """Variance of white noise that lets means converge as slowly as this noise with a bias of decay a (see ``still``)."""
     return ekf.white(1.0, noise) + bias * bias * (1.0 + a) / (1.0 - a)
 
 

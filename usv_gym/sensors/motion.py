@@ -98,10 +98,12 @@ def _propagate(P, h, a, c, q, A0, B0, A1, B1, sensors):
     (p60, p61, p62, p63, p64, p65, p66) = (P[21], P[22], P[23], P[24], P[25], P[26], P[27])
     g = 0.5 * h
     m0, m1, m2, m3, m4, m5, m6 = (
-        fma(g, p40, p20), fma(g, p41, p21), fma(g, p42, p22), fma(g, p43, p32), fma(g, p44, p42), fma(g, p54, p52), fma(g, p64, p62),
+        fma(g, p40, p20), fma(g, p41, p21), fma(g, p42, p22), fma(g, p43, p32), fma(g, p44, p42), fma(g, p54, p52),
+        fma(g, p64, p62),
     )  # fmt: skip
     w0, w1, w2, w3, w4, w5, w6 = (
-        fma(g, p50, p30), fma(g, p51, p31), fma(g, p52, p32), fma(g, p53, p33), fma(g, p54, p43), fma(g, p55, p53), fma(g, p65, p63),
+        fma(g, p50, p30), fma(g, p51, p31), fma(g, p52, p32), fma(g, p53, p33), fma(g, p54, p43), fma(g, p55, p53),
+        fma(g, p65, p63),
     )  # fmt: skip
     mm, mw, ww = fma(g, m4, m2), fma(g, m5, m3), fma(g, w5, w3)
     im, iw = fma(A0, mm, B0 * mw), fma(A0, mw, B0 * ww)  # what N gains, with the mid-point heading and speed

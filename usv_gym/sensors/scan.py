@@ -19,7 +19,22 @@ from .clutter import false_alarms
 from .coastline import deliver_land, echo_land, hide_behind_land
 from .intake import take_scan
 from .noise import pair_slot
-from .shadow import BEAM, BEARING, DE, DN, HEADING, HIGH, LENGTH, LOW, RADIUS, RANGE, WIDTH, cast_shadows, look_around, look_at
+from .shadow import (
+    BEAM,
+    BEARING,
+    DE,
+    DN,
+    HEADING,
+    HIGH,
+    LENGTH,
+    LOW,
+    RADIUS,
+    RANGE,
+    WIDTH,
+    cast_shadows,
+    look_around,
+    look_at,
+)
 
 #: rows of ``w.look`` that a scan puts in the place of what the shadows are done with: decay and kick of the bias of position
 #: and of radius, the three biases, 1 for what is detected
@@ -148,7 +163,8 @@ def _scan(w, land, o, k, sensor, reach, tick, stream_bias, stream_noise, stream_
     seed, north, east = w.seed, w.nav.position[o, 0], w.nav.position[o, 1]
     detection = sensor.detection * w.weather.detection_factor
     half2 = sensor.detection_radius * sensor.detection_radius
-    gain, floor, noise0, noise1, radius_min = sensor.gain, sensor.gain_floor, sensor.noise[0], sensor.noise[1], w.sensors.radius_min
+    gain, floor, radius_min = sensor.gain, sensor.gain_floor, w.sensors.radius_min
+    noise0, noise1 = sensor.noise[0], sensor.noise[1]
     for i in range(seen):  # vector code
         slot = w.slots[i]
         b0, b1 = rng.normal2(seed, stream_bias, 2 * slot, tick)

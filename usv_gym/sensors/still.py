@@ -49,7 +49,7 @@ def start_line(line, n, e, f, scan):
 
 @scalar
 def average(x, P, line, h, n, e, f, noise, bias, decay, fade, slowness):
-    """Take a fix n, e [m] of error factor f, h [s] after the last one.  Returns 1 if the line says that the target moves, else 0.
+    """Take a fix n, e [m] of error factor f, h [s] after the last one; returns 1 if the line says that the target moves, or 0.
 
     noise, bias: standard deviations [m] at f = 1; decay, fade, slowness: see ``ekf.decays``.
     """

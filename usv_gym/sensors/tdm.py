@@ -49,7 +49,7 @@ def drop_silent(w, o, s, now_us):
 
 @inner
 def fused(w, o, s, now_us):
-    """Fuse what the thesis's filters know of a target at ``now_us`` into w.estimate_x[0], w.estimate_p[0]; returns the phase."""
+    """Fuse what the thesis's filters know of a target into w.estimate_x[0], w.estimate_p[0]; returns the phase."""
     t = w.tracks
     x, p = w.estimate_x[0], w.estimate_p[0]
     phase = PHASE_NONE
@@ -92,9 +92,9 @@ def fused_light(w, o, now_us, first, ends):
 
 @inner
 def _courses(w, n):
-    """Rows 8-10 of ``w.look`` from 0-7, in the first n columns: course [rad], speed [m/s], variance of the course; vector code."""
+    """Rows 8-10 of ``w.look`` from 0-7, in the first n columns: course [rad], speed [m/s], variance of the course."""
     look = w.look
-    for i in range(n):
+    for i in range(n):  # vector code
         vn, ve, vv = look[2, i], look[3, i], look[6, i]
         speed2 = vn * vn + ve * ve
         look[8, i] = wrap_positive(atan2(ve, vn))

@@ -52,7 +52,7 @@ def begin_episodes(w, land, tracks, tasks, episodes):
         episode.closest = math.inf
         episode.outcome = 0
         episode.reward = 0.0
-        episode.terminated = episode.truncated = episode.over = episode.success = False
+        episode.terminated = episode.truncated = False
         for i in range(episode.terms.shape[0]):
             episode.terms[i] = 0.0
 
@@ -148,8 +148,6 @@ def _judge(w, o, task, episode):
         episode.outcome = 1 if collision else (5 if grounding else (2 if arrival else (3 if outside else 4)))
     episode.terminated = terminated
     episode.truncated = truncated
-    episode.over = terminated or truncated
-    episode.success = episode.outcome == 2
 
 
 @inner
@@ -233,14 +231,31 @@ def _possible(task, action):
     return True
 
 
+@inner
+def _report(episode, numbers, flags, b):
+    """Write what has come of an episode into column b."""
+    numbers[0, b] = episode.reward
+    numbers[1, b] = episode.time
+    numbers[2, b] = episode.closest
+    numbers[3, b] = episode.to_go
+    for i in range(episode.terms.shape[0]):
+        numbers[4 + i, b] = episode.terms[i]
+    flags[0, b] = episode.terminated
+    flags[1, b] = episode.truncated
+    flags[2, b] = episode.terminated or episode.truncated
+    flags[3, b] = episode.outcome == 2
+    flags[4, b] = episode.outcome
+
+
 @lean_kernel
-def run_batch(control, role, worlds, lanes, land, tracks, tasks, episodes, obs, rows):
+def run_batch(control, role, worlds, lanes, land, tracks, tasks, episodes, obs, numbers, flags, rows):
     """Begin an episode in the rows that ask for BEGIN, make a control step in those that ask for STEP, leave the others.
 
     control, role: see ``tasks.share``; ALONE needs no control.  worlds [B]; lanes, the room that ``lanes_for(worlds)`` makes;
     land, the pool that their ``land_id`` count in (world/land.py); tracks, that of recorded tracks; tasks [O], one per
     observer; episodes [B, O] with ``what`` (of observer 0) and ``action`` as input and the rest as result; obs [B, O, size]
-    float32, written; rows [ticks, n, A, 3] (see engine.advance_worlds).
+    float32, written; numbers [4 + terms, B] and flags uint8 [5, B], written: of observer 0 reward, time, closest, to_go and
+    terms; terminated, truncated, either, arrived, outcome; rows [ticks, n, A, 3] (see engine.advance_worlds).
     Returns -1 (UNFINISHED where helpers are at work yet), or the first row with an action that is not finite or none of
     ``discrete``; then nothing at all has moved.
     (One entry point for all, because what they share is then compiled once.)
@@ -272,6 +287,7 @@ def run_batch(control, role, worlds, lanes, land, tracks, tasks, episodes, obs, 
                 if episodes[b, 0].what != 0:
                     for o in range(O):
                         observe(worlds[b], land, o, tasks[o], obs[b, o])
+                    _report(episodes[b, 0], numbers, flags, b)
             finish(control, role)
         if role == LEAD and not await_end(control, groups):
             return UNFINISHED

@@ -149,10 +149,11 @@ def episode_dtype() -> np.dtype[Any]:
     """dtype of what passes between face and kernel, and of what a task remembers of an episode: one per observer."""
     return np.dtype([
         ("what", "i1"), ("action", "f8", (3 * A,)),  # in: tasks/step.py, BEGIN or STEP; channels of the action
-        # out, what results_dtype() sees as two rows: time since reset [s]; smallest hull distance to anything since then [m];
-        # distance to go along the route [m]
-        ("reward", "f8"), ("time", "f8"), ("closest", "f8"), ("to_go", "f8"), ("terms", "f8", (N_TERMS,)),
-        ("terminated", "?"), ("truncated", "?"), ("over", "?"), ("success", "?"),  # over: one of the two; at its end on arrival
+        ("reward", "f8"),  # out
+        # time since reset [s]; smallest hull distance to anything since then [m]; distance to go along the route [m];
+        # floats_dtype() sees all as one
+        ("time", "f8"), ("closest", "f8"), ("to_go", "f8"), ("terms", "f8", (N_TERMS,)),
+        ("terminated", "?"), ("truncated", "?"),
         ("outcome", "i1"),  # 0 running, 1 collision, 2 arrival, 3 out of area, 4 time limit, 5 grounding
         ("step", "i8"),  # steps so far
         ("heading_ref", "f8"), ("speed_ref", "f8"),  # of heading_speed and discrete
@@ -162,15 +163,11 @@ def episode_dtype() -> np.dtype[Any]:
 
 
 @functools.cache
-def results_dtype() -> np.dtype[Any]:
-    """Overlay of ``episode_dtype``: from ``reward`` to ``terms`` as ``numbers``, from ``terminated`` to ``outcome`` as ``flags``.
-
-    Each is read at once: after a step of many worlds it is dear to go to one more place in memory.
-    """
+def floats_dtype() -> np.dtype[Any]:
+    """Overlay of ``episode_dtype``: from ``time`` to ``terms`` as one row ``floats``, which is read at once."""
     whole = episode_dtype()
     assert whole.fields is not None
-    return np.dtype({"names": ["numbers", "flags"], "formats": [("f8", (4 + N_TERMS,)), ("u1", (5,))],
-                     "offsets": [whole.fields["reward"][1], whole.fields["terminated"][1]],
+    return np.dtype({"names": ["floats"], "formats": [("f8", (3 + N_TERMS,))], "offsets": [whole.fields["time"][1]],
                      "itemsize": whole.itemsize})  # fmt: skip
 
 

@@ -346,11 +346,12 @@ def _nav(O: int) -> Dtype:
 
 
 def _filters(S: int) -> Dtype:
-    """The filters of one sensor of an observer, each number a row [S], and what they are fed with (layouts: sensors/tracker.py)."""
+    """The filters of one sensor of an observer, each number a row [S], and what they are fed with."""
     return np.dtype([
         ("x", f8, (6, S)), ("p", f8, (6, S)),  # of sensors/light.py
-        # of radar and LiDAR only: line through the fixes; apparent radius and its bias; the last raw measurement, N, E, radius,
-        # f(d); truth of the sensor error, bias of N, E, radius (unit f(d)); work space of sensors/intake.py
+        # of radar and LiDAR only: line through the fixes (sensors/still.py); apparent radius and its bias; the last raw
+        # measurement, N, E, radius, f(d); truth of the sensor error, bias of N, E, radius (unit f(d)); work space of
+        # sensors/intake.py
         ("line", f8, (10, S)), ("size", f8, (2, S)), ("p_size", f8, (3, S)), ("measured", f8, (4, S)), ("bias", f8, (3, S)),
         ("todo", f8, (S,)), ("factor", f8, (S,)),
     ])  # fmt: skip
