@@ -30,8 +30,8 @@ from numba.extending import intrinsic
 F = TypeVar("F", bound=Callable[..., Any])
 
 #: No fast mathematics: results do not depend on what becomes vector code on a machine (``fma`` says where a product is added
-#: unrounded); what the C library computes, as ``expm1``, is still its own.  Nothing here is passed as a C callback, so the wrappers for it, a twentieth of the compile time, are
-#: left out.
+#: unrounded); what the C library computes, as ``expm1``, is still its own.  Nothing here is passed as a C callback, so the
+#: wrappers for it, a twentieth of the compile time, are left out.
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
 

@@ -6,7 +6,8 @@ intervals of nearer sources together (thesis 2.3.1 and 6.2.3; there only its cen
 
 Sources are taken in the order of range, and their intervals merged into a sorted list of disjoint lit intervals; a source
 whose interval lies inside one of them is hidden.  Cost: O(S log S) plus the insertions, while the order of range changes
-little from look to look; O(S^2) at the first one.  As only the order of bearings is of account, a pseudo-bearing takes their place, which rises with the bearing and needs no arctangent.
+little from look to look; O(S^2) at the first one.  As only the order of bearings is of account, a pseudo-bearing takes their
+place, which rises with the bearing and needs no arctangent.
 
 A look leaves rows of ``w.look``, in the order of range, the source being ``w.order``:
 """
